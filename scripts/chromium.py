@@ -10,6 +10,7 @@ from pathlib import Path
 from playwright.sync_api import Browser, Playwright, sync_playwright
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
+_SHELL = "chromium-headless-shell"
 
 _FLAGS = (
     "--no-sandbox",
@@ -27,9 +28,15 @@ _FLAGS = (
 _PR_CAPBSET_DROP, _CAP_SYS_NICE = 24, 23
 
 
-def find() -> str | None:
-    """Return the path of Chromium on this machine; None if it is not installed."""
-    return next((path for name in NAMES if (path := shutil.which(name))), None)
+def find(*, shell: bool = False) -> str | None:
+    """Return the path of Chromium on this machine; None if it is not installed.
+
+    Args:
+        shell: Whether its shell without windows is preferred. That draws the same pages with half the processor, but
+            does not keep the answer of a person who allows a camera.
+    """
+    names = (_SHELL, *NAMES) if shell else (*NAMES, _SHELL)
+    return next((path for name in names if (path := shutil.which(name))), None)
 
 
 @contextmanager
@@ -45,20 +52,22 @@ def playwright() -> Iterator[Playwright]:
         yield started
 
 
-def launch(playwright: Playwright, webcam: Path | None = None) -> Browser:
+def launch(playwright: Playwright, webcam: Path | None = None, *, sparing: bool = False) -> Browser:
     """Return a Chromium with a fresh profile and software WebGL.
 
     Args:
         playwright: What :func:`playwright` gives.
         webcam: Motion JPEG file (``.mjpeg``) that its webcam plays in a loop; no webcam without it.
+        sparing: Whether little of the processor is taken: WebGL smooths no edges, and the shell is preferred, but for a
+            webcam.
 
     Raises:
         FileNotFoundError: It is not installed.
     """
-    path = find()
+    path = find(shell=sparing and webcam is None)
     if path is None:
         raise FileNotFoundError(f"no browser found: install one of {', '.join(NAMES)}")
-    flags = [*_FLAGS]
+    flags = [*_FLAGS, *(("--webgl-antialiasing-mode=none",) if sparing else ())]
     if webcam is not None:
         flags += ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"]
         flags += [f"--use-file-for-fake-video-capture={webcam}"]

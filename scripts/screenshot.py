@@ -13,8 +13,9 @@ import chromium
 import cv2
 import numpy as np
 from playwright.sync_api import Page
-from slalom_lap import COURSE, SlalomLap
+from slalom_lap import COURSE, HandsCamera, SlalomLap
 
+from handsteer.cameras import Camera
 from handsteer.config import load
 from handsteer.errors import HandsteerError
 from handsteer.graph import Graph
@@ -38,12 +39,10 @@ def main() -> None:
     with opened({"camera": {"source": "virtual"}, "virtual_hand": {"script": SIGNS}}) as (page, graph):
         graph.start()
         take(page, PICTURE)
-    with opened({"camera": {"source": "browser"}, "control": {"mode": "joystick"}, "robot": {"world": COURSE}}) as (
-        page,
-        graph,
-    ):
+    camera = HandsCamera()
+    with opened({"control": {"rule": "point"}, "robot": {"world": COURSE}}, camera) as (page, graph):
         graph.start()
-        record_lap(page, graph, ANIMATION)
+        record_lap(page, graph, camera, ANIMATION)
     for path, largest in LARGEST_BYTES.items():
         size = path.stat().st_size
         if size > largest:
@@ -52,10 +51,10 @@ def main() -> None:
 
 
 @contextmanager
-def opened(sections: dict[str, Any]) -> Iterator[tuple[Page, Graph]]:
-    """Show the page of a graph with these parameters, which is not started."""
+def opened(sections: dict[str, Any], camera: Camera | None = None) -> Iterator[tuple[Page, Graph]]:
+    """Show the page of a graph with these parameters and that camera, which is not started."""
     config = load(base={**sections, "dashboard": {"port": 0}})
-    with Graph(config, steering=False) as graph, chromium.playwright() as playwright:
+    with Graph(config, steering=False, camera=camera) as graph, chromium.playwright() as playwright:
         dashboard = PageProcess()
         url = dashboard.serve(graph)
         try:
@@ -90,10 +89,10 @@ def take(page: Page, path: Path) -> None:
     page.screenshot(path=path)
 
 
-def record_lap(page: Page, graph: Graph, path: Path) -> None:
+def record_lap(page: Page, graph: Graph, camera: HandsCamera, path: Path) -> None:
     """Save ``page`` while a simulated operator drives the slalom, as an animation in real time."""
     page.locator(".world").get_by_role("button", name="Follow").click()
-    lap, end_s = SlalomLap(graph), time.monotonic() + LONGEST_S
+    lap, end_s = SlalomLap(graph, camera), time.monotonic() + LONGEST_S
     lap.start()
     try:
         animate(shots(page, lambda: time.monotonic() > end_s or is_finished(graph)), path)

@@ -1,15 +1,17 @@
-"""A simulated operator of a running graph: a rendered hand, as a joystick, in front of the browser's camera."""
+"""A simulated operator of a running graph: a rendered hand that points, in front of a camera."""
 
-import struct
+import queue
 import threading
 import time
 
-import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from handsteer.cameras import Frame
+from handsteer.clock import RealClock
 from handsteer.graph import Graph
 from handsteer.plugins.bench.courses import open_course
-from handsteer.plugins.bench.hand_interfaces import Joystick
+from handsteer.plugins.bench.hand_interfaces import Point
 from handsteer.plugins.bench.hand_view import HandCamera, HandView, LandmarkErrors
 from handsteer.plugins.bench.hands import Slips
 from handsteer.plugins.bench.interfaces import TICK_S
@@ -23,18 +25,45 @@ FRAMES_PER_S = 20.0
 SEED = 4
 
 
+class HandsCamera:
+    """A camera that delivers the operator's pictures."""
+
+    name = "webcam"
+    period_s = None
+
+    def __init__(self) -> None:
+        self._clock = RealClock()
+        self._pictures: queue.Queue[NDArray[np.uint8]] = queue.Queue(1)
+
+    def show(self, picture: NDArray[np.uint8]) -> None:
+        """Deliver ``picture`` next, unless one waits already."""
+        if self._pictures.empty():
+            self._pictures.put(picture)
+
+    def read(self) -> Frame | None:
+        """Return the next picture; None if none comes within a moment."""
+        try:
+            return Frame(self._pictures.get(timeout=0.1), self._clock.now())
+        except queue.Empty:
+            return None
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
 class SlalomLap:
     """Drives ``graph`` through the slalom, from :meth:`start` to :meth:`stop`.
 
     Args:
-        graph: Its camera source is ``browser``, its world the slalom, and its control's mode ``joystick``.
+        graph: Its world is the slalom, and its control's rule ``point``.
+        camera: Its camera.
     """
 
-    def __init__(self, graph: Graph) -> None:
-        config, skill = graph.config, KINDS["joystick"].skill
-        self._graph = graph
+    def __init__(self, graph: Graph, camera: HandsCamera) -> None:
+        config, skill = graph.config, KINDS["point"].skill
+        self._graph, self._shown = graph, camera
         view = HandView(config, "landmarks", LandmarkErrors(), SEED)
-        self._interface = Joystick(config, skill, view, Slips(0.0, 0.0), np.random.default_rng(SEED))
+        self._interface = Point(config, skill, view, Slips(0.0, 0.0), np.random.default_rng(SEED))
         self._operator = Operator(open_course(COURSE), skill, REACTION_S, np.random.default_rng(SEED))
         self._camera = HandCamera(Pinhole.webcam(config.camera.width, config.camera.height), SEED)
         self._ended = threading.Event()
@@ -70,6 +99,4 @@ class SlalomLap:
         self._interface.want(self._operator.decide(Seen(state.truth, speed, bool(state.contacts))))
 
     def _send(self, now_s: float) -> None:
-        picture = self._camera.picture(self._interface.hand.pose(), now_s)
-        _, jpeg = cv2.imencode(".jpg", picture)
-        self._graph.cameras.browser.offer(struct.pack("<d", 1e3 * time.time()) + jpeg.tobytes())
+        self._shown.show(self._camera.picture(self._interface.hand.pose(), now_s))

@@ -6,7 +6,7 @@ A distribution declares an object of its own in its ``pyproject.toml``, under th
     printer = "my_package.robot:open_robot"
 
 Once it is installed, ``--robot printer`` drives it. What is installed is listed at once, and loaded only when it is
-named. docs/plugins.md has an example for each door.
+named. docs/plugins.md has an example for each door but the last two, which handsteer keeps for itself.
 """
 
 import importlib.metadata
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from handsteer.cameras import Camera
     from handsteer.clock import Clock
     from handsteer.config import Config, Section, SignsConfig
+    from handsteer.control.assist import Around
+    from handsteer.control.obstacles import Hit
     from handsteer.recognition.hand import Classifier
     from handsteer.robots import Robot
     from handsteer.transports.base import Session
@@ -50,6 +52,22 @@ class SignAction(Protocol):
         Args:
             now: The velocity that is commanded so far.
             shown_s: Seconds since the last message with a sign, 0 for the first.
+        """
+        ...
+
+
+class Assist(Protocol):
+    """Changes what a person wants, for what a laser scanner sees; the collision monitor then limits it."""
+
+    def step(self, wanted: "Velocity", around: "Around") -> "tuple[Velocity, Hit | None]":
+        """Return the velocity to command instead of ``wanted``, and the obstacle that it avoids, or None.
+
+        It is called on the control's thread for every command, so it must return at once. If it raises, or returns what
+        :func:`handsteer.control.assist.is_within` refuses, ``wanted`` is limited as without it.
+
+        Args:
+            wanted: What the person wants; finite.
+            around: The obstacles and the robot.
         """
         ...
 
@@ -146,6 +164,9 @@ CLASSIFIERS: Final[Door[Callable[["SignsConfig"], "Classifier"]]] = Door("handst
 
 ACTIONS: Final[Door[type[SignAction]]] = Door("handsteer.actions", "action")
 """Classes of what a sign does, made without arguments; an entry of ``control.actions`` is the name."""
+
+ASSISTS: Final[Door[type[Assist]]] = Door("handsteer.assists", "assist")
+"""Classes that change commands for obstacles, made without arguments; ``control.assist`` is the name."""
 
 PARAMETERS: Final[Door[type["Section"]]] = Door("handsteer.parameters", "section of parameters")
 """Sections of the configuration; their name is that of the section."""

@@ -7,9 +7,11 @@ and exits (with code 2).
 import difflib
 import re
 import reprlib
+import shutil
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Final
 
 _SHORT: Final = reprlib.Repr()
@@ -173,9 +175,17 @@ def install_command(extra: str) -> str:
     wanted = [f"'{each.partition(';')[0].strip()}'" for each in known if of_extra.search(each)]
     if not wanted:
         return f"pip install 'handsteer[{extra}]'"
-    has_pip = importlib.util.find_spec("pip") is not None
-    installer = f"{sys.executable} -m pip install" if has_pip else f"uv pip install --python {sys.executable}"
-    return f"{installer} {' '.join(wanted)}"
+    return f"{_installer(has_pip=importlib.util.find_spec('pip') is not None)} {' '.join(wanted)}"
+
+
+def _installer(*, has_pip: bool) -> str:
+    """Return what installs packages for this Python: pip, else uv wherever it is, else pip, after it is installed."""
+    pip = f"{sys.executable} -m pip install"
+    if has_pip:
+        return pip
+    own = Path(sys.executable).with_name("uv")
+    uv = "uv" if shutil.which("uv") else str(own) if own.exists() else ""
+    return f"{uv} pip install --python {sys.executable}" if uv else f"{sys.executable} -m ensurepip && {pip}"
 
 
 @contextmanager

@@ -41,6 +41,8 @@ from handsteer.messages import (
     HAND_SIGN,
     IMAGE_ANNOTATED,
     IMAGE_COMPRESSED,
+    IMAGE_DRAWN,
+    IMAGE_LANDMARKS,
     IMAGE_RAW,
     ODOM,
     RECORDED,
@@ -141,7 +143,7 @@ class Graph:
         self.recognition.journal, self.control.journal = journals
         self._auditor = Auditor(self.transport, _NAME, self.clock)
         self._cmd_vel = cmd_vel
-        recorded = (CAMERA_CHANGED, IMAGE_COMPRESSED, cmd_vel, *((SCAN,) if config.collision_monitor.enabled else ()))
+        recorded = (CAMERA_CHANGED, IMAGE_COMPRESSED, cmd_vel, *((SCAN,) if config.uses_scans else ()))
         self.recording = RunRecording(*wires, self._auditor, (self.recognition, self.control), recorded)
         self._link = link
         self._began_s = self.clock.now()
@@ -166,7 +168,7 @@ class Graph:
     @property
     def topics(self) -> tuple[Topic[Any], ...]:
         """All topics that programs next to the graph may look at, including those on demand."""
-        on_demand = (IMAGE_RAW, IMAGE_ANNOTATED, SCAN)
+        on_demand = (IMAGE_RAW, IMAGE_ANNOTATED, IMAGE_LANDMARKS, IMAGE_DRAWN, SCAN)
         return (*RECORDED, IMAGE_COMPRESSED, self._cmd_vel, *on_demand)
 
     def add(self, node: Node) -> None:

@@ -83,13 +83,14 @@ def make_recognition(
         ModelError: A landmark model or the sign model is missing or broken.
     """
     from handsteer.nodes.recognition import HandSignRecognitionNode
-    from handsteer.recognition.hand_joystick import HandJoystick
     from handsteer.recognition.recognizer import Recognizer
 
     recognizer = recognizer or Recognizer(config)
     _warn_of_unknown_signs(config, recognizer.signs)
-    joystick = HandJoystick(config.joystick)
-    return HandSignRecognitionNode(transport, clock, recognizer, config.signs, joystick=joystick, **topics)
+    points = config.control.points
+    return HandSignRecognitionNode(
+        transport, clock, recognizer, config.signs, joystick=config.joystick, points=points, **topics
+    )
 
 
 def cmd_vel_topic(config: Config) -> Topic[Any]:

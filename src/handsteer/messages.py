@@ -127,8 +127,8 @@ def is_stopping(sign: String) -> bool:
 
 
 def is_released(message: Joy) -> bool:
-    """Return whether the joystick of the hand is not held."""
-    return not stick_in(message).held
+    """Return whether the hand drives neither as a joystick nor by pointing."""
+    return not (stick_in(message).held or pointing_in(message).held)
 
 
 # The functions of topics are not lambdas, so that a topic can be pickled for another process.
@@ -144,6 +144,10 @@ GESTURE_JOY = Topic("/gesture/joy", Joy, lifespan_s=STALE_S, stops=is_released)
 # A gamepad, from ROS's joy.
 JOY = Topic("/joy", Joy, lifespan_s=STALE_S)
 IMAGE_ANNOTATED = Topic("/gesture/image_annotated", Image)
+# The same without the name of the sign, which the page shows in the language of each browser.
+IMAGE_LANDMARKS = Topic("/gesture/image_landmarks", Image)
+# And without the picture, for those who are not to see the person.
+IMAGE_DRAWN = Topic("/gesture/image_drawn", Image)
 CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespan_s=STALE_S, stops=is_zero)
 SELECT_ROBOT = Topic("/select_robot", String, depth=10)
 SELECTED_ROBOT = Topic("/selected_robot", String, latched=True)
@@ -209,18 +213,27 @@ def twist_in(message: Twist | TwistStamped) -> Twist:
     return message.twist if isinstance(message, TwistStamped) else message
 
 
-def joy_of(stick: Stick, header: Header, *, engages: bool = False) -> Joy:
+def joy_of(stick: Stick, header: Header, *, engages: bool = False, pointing: Stick = RELEASED) -> Joy:
     """Return ``stick`` as a message for :data:`GESTURE_JOY`: axes (left, forward), button 0 while it is held.
 
-    Button 1 is whether it ``engages``: the hand has just made that gesture.
+    Button 1 is whether it ``engages``: the hand has just made that gesture. Axes 2 and 3 and button 2 are where the
+    hand points, likewise.
     """
-    axes = np.array([stick.left, stick.forward], np.float32)
-    return Joy(header=header, axes=axes, buttons=np.array([stick.held, engages], np.int32))
+    axes = np.array([stick.left, stick.forward, pointing.left, pointing.forward], np.float32)
+    return Joy(header=header, axes=axes, buttons=np.array([stick.held, engages, pointing.held], np.int32))
 
 
 def engages_in(message: Joy) -> bool:
     """Return whether the hand has just made the gesture that engages, in a message from any source."""
     return len(message.buttons) > 1 and bool(message.buttons[1])
+
+
+def pointing_in(message: Joy) -> Stick:
+    """Return where the hand points in a message of :data:`GESTURE_JOY`, from any source; released if it says nothing.
+
+    Axes are clamped to -1 to 1.
+    """
+    return stick_in(message, enable_button=2, axis_linear=3, axis_angular=2)
 
 
 def stick_in(message: Joy, *, enable_button: int = 0, axis_linear: int = 1, axis_angular: int = 0) -> Stick:

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.cameras.freshness import Freshness
+from handsteer.config import JoystickConfig
 from handsteer.recognition.engage_gesture import EngageGesture
 from handsteer.recognition.hand_joystick import HandJoystick
+from handsteer.recognition.pointing import Pointing
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.types import RELEASED, Stick
 
@@ -26,12 +28,14 @@ class Sight:
         recognition: What is seen in it; None if the image is old, or its result came too late.
         refused: Why the frame does not count, in words; None if it counts.
         stick: The hand as a joystick.
+        pointing: Where the hand points.
         engages: Whether the gesture that engages is completed.
     """
 
     recognition: Recognition | None = None
     refused: str | None = None
     stick: Stick = RELEASED
+    pointing: Stick = RELEASED
     engages: bool = False
 
 
@@ -41,11 +45,14 @@ class FramePipeline:
     Args:
         recognizer: Recognises the signs.
         joystick: The hand as a joystick.
+        pointing: Where the hand points.
         gesture: Detects the gesture that engages.
     """
 
-    def __init__(self, recognizer: Recognizer, joystick: HandJoystick, gesture: EngageGesture) -> None:
-        self.recognizer, self.joystick, self.gesture = recognizer, joystick, gesture
+    def __init__(
+        self, recognizer: Recognizer, joystick: HandJoystick, pointing: Pointing, gesture: EngageGesture
+    ) -> None:
+        self.recognizer, self.joystick, self.pointing, self.gesture = recognizer, joystick, pointing, gesture
         self._freshness = Freshness()
         self._unseen_s = 0.0
 
@@ -69,7 +76,7 @@ class FramePipeline:
             image: (height, width, 3) uint8, BGR, not mirrored.
             dt_s: Seconds since the last frame was captured, >= 0, those that were passed over included.
             recorded: Whether it is from a recording, which may start again.
-            as_joystick: Whether joystick and gesture are wanted; otherwise they are reset.
+            as_joystick: Whether sticks and gesture are wanted; otherwise they are reset.
             why_too_late: Called when the sign is known: why it must not count any more, in words; None if it may.
 
         Raises:
@@ -83,6 +90,7 @@ class FramePipeline:
         recognition = self.recognizer.step(image, self._unseen_s)
         if as_joystick:
             self.joystick.step(recognition, self._unseen_s)
+            self.pointing.step(recognition, self._unseen_s)
             self.gesture.step(recognition, self._unseen_s)
         else:
             self.forget_gestures()
@@ -93,11 +101,30 @@ class FramePipeline:
             return Sight(refused=refused)
         if recognition.hand is not None:
             refused = self._freshness.why_hand_refused(recognition.hand.box_px, dt_s)
-        return Sight(recognition, refused, self.joystick.stick, engages=self.gesture.progress == 1.0)
+        engages = self.gesture.progress == 1.0
+        return Sight(recognition, refused, self.joystick.stick, self.pointing.stick, engages=engages)
+
+    def reconfigure(self, config: JoystickConfig) -> None:
+        """Change the parameters of both sticks."""
+        self.joystick.reconfigure(config)
+        self.pointing.reconfigure(config)
+
+    def draw(self, picture: NDArray[np.uint8], *, points: bool) -> None:
+        """Draw the stick that drives into a mirrored ``picture``, (height, width, 3) uint8, BGR.
+
+        That is where the hand points, if ``points``, else the hand as a joystick, if it is held.
+        """
+        (self.pointing if points else self.joystick).draw(picture)
 
     def pass_over(self, image: NDArray[np.uint8]) -> None:
         """Record a picture that is skipped: it is not new either when it comes again."""
         self._freshness.pass_over(image)
+
+    def begin_again(self) -> None:
+        """Forget everything: a recording begins, perhaps once more, so its pictures are new."""
+        self._freshness = Freshness()
+        self._unseen_s = 0.0
+        self.forget()
 
     def forget(self) -> None:
         """Forget the hand, and what it showed: after a pause, and with another camera."""
@@ -105,6 +132,7 @@ class FramePipeline:
         self.forget_gestures()
 
     def forget_gestures(self) -> None:
-        """Release the joystick, and begin the gesture again."""
+        """Release both sticks, and begin the gesture again."""
         self.joystick.reset()
+        self.pointing.reset()
         self.gesture.reset()

@@ -21,6 +21,7 @@ from handsteer.control.explain import Reason, seconds_to_renew, warned
 from handsteer.pipeline import FramePipeline, Sight
 from handsteer.recognition.engage_gesture import EngageGesture
 from handsteer.recognition.hand_joystick import HandJoystick
+from handsteer.recognition.pointing import Pointing
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.types import RELEASED, ZERO, Stick, Velocity
 
@@ -46,12 +47,12 @@ class Teleop:
     def __init__(self, config: Config | None = None, recognizer: Recognizer | None = None) -> None:
         config = config or Config()
         self.recognition: Recognition | None = None
-        joystick = HandJoystick(config.joystick)
-        self._pipeline = FramePipeline(recognizer or Recognizer(config), joystick, EngageGesture())
+        sticks = HandJoystick(config.joystick), Pointing(config.joystick)
+        self._pipeline = FramePipeline(recognizer or Recognizer(config), *sticks, EngageGesture())
         self._max_frame_age_s = config.signs.max_frame_age
         self._refused: str | None = "no image has come"
         self._since_image_s = self._since_seen_s = 0.0
-        self._is_joystick = config.control.mode == "joystick"
+        self._config = config.control
         self._stick = RELEASED
         self._control = Control(
             config.control,
@@ -89,6 +90,10 @@ class Teleop:
             self.recognition = None
         return self._velocity
 
+    def hold_back(self, velocity: Velocity) -> None:
+        """Continue from ``velocity``: the slower one that was commanded instead of what :meth:`step` returned."""
+        self._control.mux.hold_back(velocity)
+
     def stop(self) -> None:
         """Stop until :meth:`reset`; signs are ignored."""
         self._command(self._control.stop())
@@ -99,7 +104,7 @@ class Teleop:
 
     @property
     def stick(self) -> Stick:
-        """The hand as a joystick in the last image."""
+        """By which the hand drives in the last image: as a joystick, or where it points; released if signs drive."""
         return self._stick
 
     @property
@@ -130,7 +135,8 @@ class Teleop:
         if sight.recognition is not None:
             self.recognition = sight.recognition
             self._since_seen_s = 0.0
-            self._stick = sight.stick if self._is_joystick else RELEASED
+            by_hand = sight.stick if self._config.mode == "joystick" else sight.pointing
+            self._stick = by_hand if self._config.by_stick else RELEASED
         return sight
 
     def _fault(self, why: str) -> Velocity:

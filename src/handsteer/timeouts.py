@@ -41,6 +41,10 @@ DISTRUST_S: Final = 0.1
 RECORDED_S: Final = 5.0
 """No link delays frames by so much: older ones are from a recording, or from an unsynchronized clock."""
 
+PLAYED_S: Final = 1.0
+"""A player of recordings that sends nothing for this long has paused or ended. Shorter gaps are those of a busy
+machine, in which the control stops, as without any sign."""
+
 BURST_S: Final = 0.01
 """Messages at shorter intervals, from the moment a process continues, have been waiting, however long a busy machine
 takes to deliver them; no camera and no node sends so fast."""

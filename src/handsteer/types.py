@@ -86,14 +86,15 @@ EFFECTS: dict[Action, str] = {
 }
 """The effect of each action on the robot, in words."""
 
-CRUISE_EFFECTS: Mapping[Action, str] = EFFECTS | {
-    "forward": "a step faster forward; keeps turning",
-    "backward": "a step slower, then backward; keeps turning",
-    "turn_left": "turns left while shown; keeps its speed",
-    "turn_right": "turns right while shown; keeps its speed",
+POINT_EFFECTS: Mapping[Action, str] = EFFECTS | {
+    "forward": "drives where it points; raise the hand to go faster",
+    "backward": "drives back where it points; raise the hand to go faster",
+    "turn_left": "turns left in place",
+    "turn_right": "turns right in place",
     "go": "drives straight on; keeps its speed",
+    "turbo": "goes on as it does",
 }
-"""The same with ``control.rule: cruise``."""
+"""The same with ``control.rule: point``."""
 
 BUILT_IN: Mapping[str, Action] = {
     FORWARD: "forward",

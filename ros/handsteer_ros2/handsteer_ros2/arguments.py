@@ -1,5 +1,6 @@
 """Shared by the launch files: their arguments, and how to start a node of handsteer."""
 
+import os
 from typing import Any
 
 from launch.actions import DeclareLaunchArgument, SetEnvironmentVariable
@@ -74,6 +75,7 @@ def node(verb: str, name: str, *words: Any, parameters: dict[str, Any] | None = 
         arguments=["--transport", LaunchConfiguration("transport"), *words],
         parameters=[LaunchConfiguration("params_file"), {"use_sim_time": simulated, **(parameters or {})}],
         remappings=[(CMD_VEL, LaunchConfiguration("cmd_vel")), *more.pop("remappings", [])],
+        additional_env={"HANDSTEER_LAUNCH": str(os.getpid())},
         respawn=LaunchConfiguration("respawn"),
         respawn_delay=1.0,
         output="screen",

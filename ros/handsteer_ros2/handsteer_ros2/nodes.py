@@ -4,11 +4,14 @@ If handsteer is installed for ROS's own Python, the node runs there and can use 
 set, the program of that name is run, such as handsteer in a virtual environment.
 """
 
+import ctypes
 import importlib.util
 import os
 import shutil
 import signal
 import sys
+
+_PR_SET_PDEATHSIG = 1
 
 
 def camera() -> None:
@@ -36,7 +39,20 @@ def steering() -> None:
     _run("steering")
 
 
+def _end_with_launch() -> None:
+    """End by SIGTERM when the ``ros2 launch`` that started this process has ended, however; only on Linux.
+
+    The launch files name its process in ``HANDSTEER_LAUNCH``; a node that a shell has started outlives that.
+    """
+    parent = os.getppid()
+    if os.environ.get("HANDSTEER_LAUNCH") == str(parent) and sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGTERM))
+        if os.getppid() != parent:  # it ended before the call
+            sys.exit(0)
+
+
 def _run(verb: str) -> None:
+    _end_with_launch()
     words = sys.argv[1:]
     transport = [] if "--transport" in words else ["--transport", "auto"]
     named = os.environ.get("HANDSTEER", "")

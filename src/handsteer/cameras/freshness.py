@@ -13,8 +13,8 @@ _PICTURES = 4096
 _RECENT = 8
 """Of a recording, which may be looped, only so many: a frozen camera may share its topic with working ones."""
 
-_ROWS = 480
-"""Of a larger picture, every second, third, ... row is compared."""
+_ROWS = 240
+"""A codec repeats blocks of at least 8 rows, so a third of the rows of 720 shows what all of them do."""
 _GRID = (30, 40)
 _TILED_PICTURES = 2048
 _FEW_TILES = 4
@@ -33,15 +33,20 @@ class Freshness:
     parts are evidence only if they are nearly the whole region of the hand: then the picture is torn, or only something
     else in it, such as a clock, still changes.
 
+    Args:
+        rows: Of a picture that has at least twice as many, every second, third, ... row is compared.
+
     Attributes:
         frozen_s: How long old pictures have been received, in seconds; 0 after a new one.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, rows: int = _ROWS) -> None:
+        self._rows = rows
         self.frozen_s = 0.0
         self._known = _Memory()
         self._passed_over = _Memory()
         self._tiles = _Tiles()
+        self._unseen: tuple[_Sums, tuple[int, ...], int] | None = None
         self._hand_frozen_s = 0.0
 
     def why_refused(self, image: NDArray[np.uint8], dt_s: float, *, recorded: bool = False) -> str | None:
@@ -52,14 +57,14 @@ class Freshness:
             dt_s: Seconds since the previous picture, >= 0.
             recorded: Whether it is from a recording, which may start again: it is compared with the last few only.
         """
-        sums = _tile_sums(image)
+        sums = _tile_sums(image, self._rows)
         print_ = _print_of(sums)
         most = _RECENT if recorded else _PICTURES
         if self._known.add(print_, most) or self._passed_over.has(print_, most):
             self.frozen_s += dt_s
             return f"the camera is frozen: the same picture for {self.frozen_s:.1f} s"
         self.frozen_s = 0.0
-        self._tiles.add(sums, image.shape, min(most, _TILED_PICTURES))
+        self._unseen = sums, image.shape, min(most, _TILED_PICTURES)
         if image[:: max(1, len(image) // _GRID[0]), ::8].mean() < _BLACK:
             return "the picture is black: is the lens covered?"
         return None
@@ -69,7 +74,7 @@ class Freshness:
 
         Skipped pictures are stored separately, so any number of them does not displace the others.
         """
-        self._passed_over.add(_print_of(_tile_sums(image)), _PICTURES)
+        self._passed_over.add(_print_of(_tile_sums(image, self._rows)), _PICTURES)
 
     def why_hand_refused(self, box: Box, dt_s: float) -> str | None:
         """Return why the hand in ``box`` of the last picture counts as stale, in words; None if it is current.
@@ -78,6 +83,9 @@ class Freshness:
             box: Left, top, right and bottom in pixels; the last two are exclusive.
             dt_s: Seconds since the previous picture, >= 0.
         """
+        if self._unseen is not None:
+            self._tiles.add(*self._unseen)
+            self._unseen = None
         if not self._tiles.repeats(box):
             self._hand_frozen_s = 0.0
             return None
@@ -177,19 +185,21 @@ def _factors(rows: int, words: int) -> _Sums:
     return np.asarray(random | np.uint64(1), np.uint64)
 
 
-def _tile_sums(image: NDArray[np.uint8]) -> _Sums:
+def _tile_sums(image: NDArray[np.uint8], most_rows: int) -> _Sums:
     """Return a fingerprint of each tile, at most 30 rows of 40; the last few pixels of a side may be left out."""
-    image = image[:: max(1, len(image) // _ROWS)]
+    image = image[:: max(1, len(image) // most_rows)]
     if image[0].nbytes < 8:
         image = np.repeat(image, 8, axis=1)
-    lines = np.ascontiguousarray(image.reshape(len(image), -1)).view(np.uint8)
+    lines = image.reshape(len(image), -1)
+    if lines.dtype != np.uint8 or lines.strides[1] != 1:
+        lines = np.ascontiguousarray(lines).view(np.uint8)
     words = lines[:, : lines.shape[1] // 8 * 8].view(np.uint64)
     count = words.shape[1]
     high, wide = -(-len(words) // _GRID[0]), -(-count // _GRID[1])
     rows, columns = len(words) // high, count // wide
     # Multilinear hashing: a change of one word always shows, as its factor is odd.
-    of_columns = (words[: rows * high].reshape(rows, high, count) * _factors(high, count)).sum(axis=1)
-    return np.asarray(of_columns[:, : columns * wide].reshape(rows, columns, wide).sum(axis=2), np.uint64)
+    of_columns = np.einsum("rhc,hc->rc", words[: rows * high].reshape(rows, high, count), _factors(high, count))
+    return np.add.reduceat(of_columns[:, : columns * wide], np.arange(0, columns * wide, wide), axis=1)
 
 
 def _print_of(sums: _Sums) -> int:

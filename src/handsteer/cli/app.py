@@ -69,7 +69,7 @@ _EXAMPLES = """Examples:
   handsteer replay drive.mcap                    the same frames again: the same commands?
   handsteer report drive.mcap                    what happened, as an HTML page
   handsteer signs evaluate photos/               how well are signs recognised?
-  handsteer bench --course slalom                how well does one drive?
+  handsteer bench                                how well does one drive?
   handsteer camera --transport ros1              one node, in a ROS 1 graph
   handsteer camera --transport auto              one node, in a ROS 2 graph
   handsteer parameters control                   what can be set, each as an option

@@ -76,6 +76,8 @@ def run(verb: str, transport: str, words: tuple[str, ...], settle: Callable[[dic
         config = settle(from_parameters(session.parameters, job.section, session.name))
         node = job.make(config, session.transport, session.clock)
         session.serve(NodeParameters(config, job.section, _audited(node, config), node.check))
+        if node.is_managed:
+            session.manage(node)
         session.offer(node.services)
         _run_until_end(node, session, job.companion(node, config))
     except KeyboardInterrupt:

@@ -13,7 +13,14 @@ from typing import Any, Literal, TypeVar
 from pydantic import Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
-from handsteer.config.driving import PRESETS, CollisionMonitorConfig, ControlConfig, RobotConfig, RobotKind
+from handsteer.config.driving import (
+    PRESETS,
+    CollisionMonitorConfig,
+    ControlConfig,
+    RobotConfig,
+    RobotKind,
+    assist_of,
+)
 from handsteer.config.recognition import (
     CameraConfig,
     JoyConfig,
@@ -47,6 +54,7 @@ __all__ = [
     "SignsConfig",
     "TeachConfig",
     "VirtualHandConfig",
+    "assist_of",
     "cmd_vel_type",
     "describe",
     "live",
@@ -175,9 +183,14 @@ class Config(Section):
 
     @model_validator(mode="after")
     def _monitors_one_robot(self) -> "Config":
-        if self.collision_monitor.enabled and self.control.robots:
-            raise ValueError("collision_monitor.enabled should be false with control.robots: it is for one robot")
+        if self.uses_scans and self.control.robots:
+            raise ValueError("control.assist should be off with control.robots: it is for one robot")
         return self
+
+    @property
+    def uses_scans(self) -> bool:
+        """Whether the control looks at laser scans."""
+        return assist_of(self.control, self.collision_monitor) != "off"
 
 
 def load(path: Path | None = None, base: dict[str, Any] | None = None, *overrides: dict[str, Any]) -> Config:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from pydantic import Field, field_validator
 
 from handsteer.config.section import Section, live
-from handsteer.doors import ACTIONS, ROBOTS, TRANSPORTS
+from handsteer.doors import ACTIONS, ASSISTS, ROBOTS, TRANSPORTS
 from handsteer.timeouts import ODOMETRY_S, RENEW_S, ROBOT_S, STALE_S
 from handsteer.types import ALWAYS_STOP, BUILT_IN, Action, CmdVelType, find_sign
 
@@ -33,8 +33,10 @@ ROBOT_KINDS = tuple(dict.fromkeys((*_KINDS, *ROBOTS.names(), *TRANSPORTS.names()
 if TYPE_CHECKING:
     RobotKind = str
     SignEffect = Action
+    AssistKind = str
 else:
     RobotKind = Literal[ROBOT_KINDS]
+    AssistKind = Literal[("off", "brake", *ASSISTS.names())]
     SignEffect = Literal[(*get_args(Action), *ACTIONS.names())]
 SIGN_EFFECTS: tuple[Any, ...] = (*get_args(Action), *ACTIONS.names())
 """What signs can do: the built-in actions, and those of plug-ins."""
@@ -71,10 +73,10 @@ class ControlConfig(Section):
         "signs",
         description="What the hand is: signs, as in the tutorial, or a joystick (/gesture/joy), with a gamepad on /joy",
     )
-    rule: Literal["course", "cruise"] = live(
+    rule: Literal["course", "point"] = live(
         "course",
-        description="How signs drive: course is the tutorial's rule; cruise keeps a set speed that Forward and "
-        "Backward change in steps, turns while a turn is shown, and goes straight with Go",
+        description="How signs drive: course is the tutorial's rule; point drives where the index finger points, the "
+        "faster the higher the hand is, and keeps the speed with Go",
     )
     ramp: Literal["per_message", "per_second"] = live(
         "per_message",
@@ -85,17 +87,10 @@ class ControlConfig(Section):
     linear_acceleration: float = live(0.3, gt=0, le=10, description="Change of linear speed with per_second [m/s²]")
     angular_acceleration: float = live(3.0, gt=0, le=50, description="Change of angular speed with per_second [rad/s²]")
     # The defaults are those with which handsteer bench drives best (docs/driving.md).
-    cruise_step: float = live(0.25, gt=0, le=5, description="Step of the set speed with cruise [m/s]")
-    cruise_step_time: float = live(
-        0.4, gt=0, le=5, description="A sign that is held changes the set speed by a further step after this long [s]"
+    point_time: float = live(
+        0.8, gt=0, le=10, description="With point, time from zero to the full speed while a finger points [s]"
     )
-    cruise_acceleration: float = live(
-        0.6, gt=0, le=10, description="Acceleration to the set speed with cruise; it brakes twice as hard [m/s²]"
-    )
-    cruise_turn: float = live(1.0, gt=0, le=20, description="Angular speed that a turn reaches with cruise [rad/s]")
-    cruise_angular_acceleration: float = live(
-        1.5, gt=0, le=50, description="Angular acceleration of a turn with cruise; it ends twice as fast [rad/s²]"
-    )
+    point_turn: float = live(1.5, gt=0, le=20, description="With point, turn rate of a finger at its full tilt [rad/s]")
     max_sign_rate: float = live(
         60.0,
         gt=0,
@@ -140,6 +135,11 @@ class ControlConfig(Section):
     actions: dict[str, SignEffect] = live(
         {}, description="Actions of signs, such as {Hi: stop, Peace: turbo}; Stop and NONE always stop"
     )
+    assist: AssistKind = live(
+        "off",
+        description="What the robot does before obstacles that a laser scanner sees: brake slows down and stops, steer "
+        "also drives around them where it can; both need the topic `scan`",
+    )
     arming: Literal["auto", "on", "off", "course"] = Field(
         "auto",
         description="Whether signs move the robot only after neutral (Stop, or no hand) at start-up and after each "
@@ -176,7 +176,17 @@ class ControlConfig(Section):
         description="Namespaces of robots that one hand drives in turn, such as [r1, r2]; empty for a single robot",
     )
 
-    @field_validator("arming", "engage", "renew", mode="before")
+    @property
+    def points(self) -> bool:
+        """Whether the hand drives where it points."""
+        return self.mode == "signs" and self.rule == "point"
+
+    @property
+    def by_stick(self) -> bool:
+        """Whether the hand drives by the states on ``/gesture/joy``, not by the signs."""
+        return self.mode == "joystick" or self.points
+
+    @field_validator("arming", "assist", "engage", "renew", mode="before")
     @classmethod
     def _from_yaml(cls, value: object) -> object:
         # YAML, and so ROS, converts on and off to true and false.
@@ -205,9 +215,11 @@ class ControlConfig(Section):
 
 
 class CollisionMonitorConfig(Section):
-    """Slows and stops the robot before obstacles that a laser scanner sees in its path."""
+    """Obstacles that a laser scanner sees: the size of the robot and how it brakes, for the assist of the control."""
 
-    enabled: bool = live(False, description="Whether to slow commands before obstacles; needs the topic `scan`")
+    enabled: bool = live(
+        False, description="For older configurations: the same as control.assist brake, where that is off"
+    )
     source_timeout: float = live(
         0.45, gt=0, le=5, description="The robot is stopped after this long without a scan, or if the scan is older [s]"
     )
@@ -227,6 +239,11 @@ class CollisionMonitorConfig(Section):
     scan_x: float = live(0.0, ge=-10, le=10, description="Position of the scanner ahead of the base frame [m]")
     scan_y: float = live(0.0, ge=-10, le=10, description="Position of the scanner to the left of the base frame [m]")
     scan_yaw: float = live(0.0, ge=-7, le=7, description="Rotation of the scanner to the left [rad]")
+
+
+def assist_of(control: ControlConfig, monitor: CollisionMonitorConfig) -> str:
+    """Return what the control does before obstacles: ``off``, ``brake``, or the name of an assist."""
+    return "brake" if control.assist == "off" and monitor.enabled else control.assist
 
 
 class RobotConfig(Section):

@@ -140,8 +140,9 @@ class SignsConfig(Section):
     )
     recorded: Recorded = Field(
         "auto",
-        description="Whether to accept frames with old stamps, as in recordings: auto accepts those of rosbag play; "
-        "always accepts all that are stamped more than 5 s ago, so use it for recordings only",
+        description="Whether to accept frames with old stamps, as in recordings, and recognise each: auto accepts "
+        "those of rosbag play and ros2 bag play; always accepts all that are stamped more than 5 s ago, so use it "
+        "for recordings only",
     )
     image_transport: Literal["auto", "raw", "compressed"] = Field(
         "auto",
@@ -168,6 +169,18 @@ class JoystickConfig(Section):
     expo: float = live(
         0.4, ge=0, le=1, description="Share of the cube in the response: 0 is linear, more is finer near the middle"
     )
+    tilt_dead_zone: float = live(
+        6.0, ge=0, le=30, description="With control.rule point, tilts of the finger below this have no effect [deg]"
+    )
+    full_tilt: float = live(
+        40.0, gt=0, le=50, description="With control.rule point, tilt of the finger for the full turn [deg]"
+    )
+    slow_at: float = live(
+        0.75, gt=0, le=1, description="With control.rule point, height of the palm for the lowest speed, 0 is the top"
+    )
+    fast_at: float = live(
+        0.4, ge=0, lt=1, description="With control.rule point, height of the palm for the highest speed, 0 is the top"
+    )
     min_cutoff: float = live(
         12.0, gt=0, le=100, description="Cutoff frequency of the One-Euro filter for a hand at rest [Hz]"
     )
@@ -180,6 +193,12 @@ class JoystickConfig(Section):
         if self.full_deflection <= self.dead_zone:
             raise ValueError(
                 f"full_deflection should be above dead_zone, {self.dead_zone:g}; it is {self.full_deflection:g}"
+            )
+        if self.slow_at <= self.fast_at:
+            raise ValueError(f"slow_at should be above fast_at, {self.fast_at:g}; it is {self.slow_at:g}")
+        if self.full_tilt <= self.tilt_dead_zone:
+            raise ValueError(
+                f"full_tilt should be above tilt_dead_zone, {self.tilt_dead_zone:g}; it is {self.full_tilt:g}"
             )
         return self
 

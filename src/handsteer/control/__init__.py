@@ -15,8 +15,9 @@ from typing import Literal
 from handsteer.config import ControlConfig
 from handsteer.control.engagement import Steered, SteeredBy
 from handsteer.control.explain import Reason
+from handsteer.control.pointing import pointed
 from handsteer.control.safety import Ramp, Safety
-from handsteer.control.sign_control import CruiseControl, SignControl
+from handsteer.control.sign_control import SignControl
 from handsteer.types import NONE, RELEASED, ZERO, Stick, Velocity, action_of
 
 _SLACK_S = 1e-6
@@ -44,6 +45,7 @@ class Control:
         self.mux = TwistMux(config)
         self._ramp = Ramp(config)
         self._since_command_s = 0.0
+        self._stop_is_shown = True
 
     def step(
         self,
@@ -73,10 +75,12 @@ class Control:
             return self.halt()
         self.safety.step(dt_s)
         self._since_command_s += dt_s
+        if self._config.points:
+            stick = self._agreeing(sign, stick)
         self._note(sign, steering, by, stick)
         if sign is not None:
             sign = self._admitted(sign)
-        if self._config.mode == "signs":
+        if not self._config.by_stick:
             stick = None
         elif stick is not None and not self.safety.admits_stick(held=stick.held):
             stick = RELEASED
@@ -108,7 +112,7 @@ class Control:
     @property
     def must_renew(self) -> bool:
         """Whether what would drive has to be shown again first."""
-        by_hand: Steered = "signs" if self._config.mode == "signs" else "joystick"
+        by_hand: Steered = "joystick" if self._config.by_stick else "signs"
         return self.safety.must_renew(self._driven_by if self.mux.source == "steering" else by_hand)
 
     @property
@@ -166,10 +170,18 @@ class Control:
         velocity = self._ramped(self.mux.reconfigure(config))
         return stopped if velocity is None else velocity
 
+    def _agreeing(self, sign: str | None, stick: Stick | None) -> Stick | None:
+        """Return the stick that counts: released, at once, by a sign that stops, whatever it says until another one."""
+        if sign is not None:
+            self._stop_is_shown = action_of(sign, self._config.actions) == "stop"
+            self.mux.note_shown(sign)
+        is_asked = sign is not None or stick is not None
+        return RELEASED if is_asked and self._stop_is_shown else stick
+
     def _admitted(self, sign: str) -> str | None:
         """Return the sign to follow: ``NONE`` if none may be, None if signs do not drive."""
         self.safety.engagement.note_sign(sign)
-        if self._config.mode == "joystick":
+        if self._config.by_stick:
             return None
         stops = action_of(sign, self._config.actions) == "stop"
         return sign if self.safety.admits_sign(sign, stops=stops) else NONE
@@ -195,7 +207,7 @@ class TwistMux:
 
     def __init__(self, config: ControlConfig) -> None:
         self._config = config
-        self._signs = _signs_by_rule(config)
+        self._signs = SignControl(config)
         self._since_input_s = 0.0
         self._is_held = False
         self._last_sign: str | None = None
@@ -216,12 +228,12 @@ class TwistMux:
         if self.source == "steering":
             return self._wait(dt_s, self._config.steering_timeout)
         if stick is not None:
-            return self._follow_stick(stick)
+            return self._follow_stick(stick, dt_s)
         if self.source == "joystick":
             return self._wait(dt_s, self._config.sign_timeout)
         velocity = self._signs.step(sign, dt_s)
         if sign is not None:
-            self._last_sign = sign
+            self.note_shown(sign)
         self.source = "none" if self._signs.silent else "signs"
         return self._take(velocity)
 
@@ -231,13 +243,14 @@ class TwistMux:
         Returns:
             The velocity to command now if the last one exceeds the new limits; else None.
         """
-        if config.rule == self._config.rule:
-            self._signs.reconfigure(config)
-        else:
-            self._signs = _signs_by_rule(config)
+        self._signs.reconfigure(config)
         self._config = config
         within = self.velocity.clamped(config.max_linear, config.max_angular)
         return self._take(within if self.source != "none" and within != self.velocity else None)
+
+    def note_shown(self, sign: str) -> None:
+        """Record the sign that is shown, whether it is followed or not."""
+        self._last_sign = sign
 
     def hold_back(self, velocity: Velocity) -> None:
         """Continue from ``velocity``, a slower one that was commanded instead of the last."""
@@ -259,15 +272,25 @@ class TwistMux:
         if self._config.mode == "joystick":
             is_held = self.source == "joystick" and self._is_held
             return Reason("not_held" if not is_held else "held" if self.velocity.is_zero else "joystick")
-        return self._reason_of_signs
+        return self._reason_of_pointing if self._config.points else self._reason_of_signs
+
+    @property
+    def _reason_of_pointing(self) -> Reason:
+        if self.source == "joystick" and not self.velocity.is_zero:
+            return Reason("pointed")
+        return self._reason_of_signs if self.source == "none" else self._reason_without_motion
 
     @property
     def _reason_of_signs(self) -> Reason:
         if self.source == "none":
             return Reason("no_input", f"{self._config.sign_timeout:g}")
-        sign = self._last_sign or NONE
         if not self.velocity.is_zero:
-            return Reason("sign", sign)
+            return Reason("sign", self._last_sign or NONE)
+        return self._reason_without_motion
+
+    @property
+    def _reason_without_motion(self) -> Reason:
+        sign = self._last_sign or NONE
         if sign == NONE:
             return Reason("no_sign")
         action = action_of(sign, self._config.actions)
@@ -275,8 +298,12 @@ class TwistMux:
             return Reason("stop_sign", sign)
         return Reason("not_started", sign if action == "go" else "")
 
-    def _follow_stick(self, stick: Stick) -> Velocity | None:
+    def _follow_stick(self, stick: Stick, dt_s: float) -> Velocity | None:
         config, self._is_held = self._config, stick.held
+        if config.points:
+            # The time before the first state does not count.
+            since_s = self._since_input_s + dt_s if self.source == "joystick" else 0.0
+            return self._follow("joystick", pointed(stick, self.velocity, config, since_s))
         wanted = Velocity(stick.forward * config.max_linear, stick.left * config.max_angular)
         return self._follow("joystick", wanted if stick.held else ZERO)
 
@@ -295,7 +322,3 @@ class TwistMux:
         if velocity is not None:
             self.velocity = velocity
         return velocity
-
-
-def _signs_by_rule(config: ControlConfig) -> SignControl:
-    return CruiseControl(config) if config.rule == "cruise" else SignControl(config)

@@ -7,13 +7,15 @@ from typing import Literal
 from handsteer.config import ControlConfig
 from handsteer.control.actions import added_effect
 from handsteer.timeouts import RENEW_WARNING_S
-from handsteer.types import CRUISE_EFFECTS, EFFECTS, Action
+from handsteer.types import EFFECTS, POINT_EFFECTS, Action
 
 ReasonCode = Literal[
     "sign",
     "steered",
     "joystick",
+    "pointed",
     "stopped",
+    "inactive",
     "starting",
     "disarmed",
     "disengaged",
@@ -31,13 +33,15 @@ ReasonCode = Literal[
     "stop_sign",
     "not_started",
 ]
-"""Every reason for what is commanded; the first three are those of a robot that drives."""
+"""Every reason for what is commanded; the first four are those of a robot that drives."""
 
 _SENTENCES: dict[ReasonCode, str] = {
     "sign": "{}",
     "steered": "steered directly",
     "joystick": "driven by the hand as a joystick",
+    "pointed": "driven where the hand points",
     "stopped": "stopped, until it is reset",
+    "inactive": "deactivated: another program activates this node",
     "starting": "has just started: whether the robot was stopped before is not known yet",
     "disarmed": "show Stop or lower your hand to begin{}",
     "disengaged": "open, close and open your hand to begin",
@@ -69,17 +73,19 @@ class Reason:
         detail: What the code leaves open: the sign, why it is disarmed, which obstacle, ...
         robot: The robot that is disarmed, if there are several; else empty.
         slowed: The obstacle that slows it, as ``obstacle 0.42 m ahead``; empty if none does.
+        steered: Where an assist steers it, as ``left of an obstacle 0.42 m ahead``; empty if none does.
     """
 
     code: ReasonCode
     detail: str = ""
     robot: str = ""
     slowed: str = ""
+    steered: str = ""
 
     @property
     def is_driving(self) -> bool:
         """Whether the robot is to move."""
-        return self.code in ("sign", "steered", "joystick")
+        return self.code in ("sign", "steered", "joystick", "pointed")
 
     def state(self, *, is_moving: bool = False) -> State:
         """Return what the robot does, if it is measured to move as ``is_moving`` says."""
@@ -104,6 +110,7 @@ class Reason:
             detail = f"{robot} ({detail})" if detail else robot
             robot = ""
         slowed = f", slowed: {self.slowed}" if self.slowed else ""
+        slowed += f", steering {self.steered}" if self.steered else ""
         return f"{_SENTENCES[self.code].format(detail)}{robot}{slowed}"
 
     def __str__(self) -> str:
@@ -131,7 +138,7 @@ def effect_words(action: Action, rule: ControlConfig | None) -> str:
     """Return the effect of ``action`` under ``rule``, without figures; None is the default rule."""
     if action not in EFFECTS:
         return added_effect(action)
-    return (CRUISE_EFFECTS if rule and rule.rule == "cruise" else EFFECTS)[action]
+    return (POINT_EFFECTS if rule and rule.rule == "point" else EFFECTS)[action]
 
 
 def figures_of(action: Action, rule: ControlConfig) -> str:
@@ -139,9 +146,9 @@ def figures_of(action: Action, rule: ControlConfig) -> str:
     max_angular, is_timed = rule.max_angular, rule.ramp == "per_second"
     linear = f"{rule.linear_acceleration:g} m/s a second" if is_timed else f"{rule.linear_step:g} m/s a frame"
     angular = f"{rule.angular_acceleration:g} rad/s a second" if is_timed else f"{rule.angular_step:g} rad/s a frame"
-    if rule.rule == "cruise":
-        linear, angular = f"{rule.cruise_step:g} m/s a step", f"{rule.cruise_angular_acceleration:g} rad/s a second"
-        max_angular = min(rule.cruise_turn, max_angular)
+    if rule.rule == "point" and action in ("forward", "backward", "turn_left", "turn_right"):
+        is_turn = action.startswith("turn")
+        return f"up to {min(rule.point_turn, max_angular):g} rad/s" if is_turn else f"up to {rule.max_linear:g} m/s"
     if action in ("forward", "backward"):
         return f"{linear}, up to {rule.max_linear:g} m/s"
     if action in ("turn_left", "turn_right"):

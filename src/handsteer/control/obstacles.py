@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import CollisionMonitorConfig
+from handsteer.control.assist import Around, assisted
 from handsteer.control.footprint import (
     Points,
     after,
@@ -24,6 +25,7 @@ from handsteer.control.footprint import (
     reach_m,
     seen_from,
 )
+from handsteer.doors import Assist
 from handsteer.types import ZERO, Velocity, changed_towards
 
 _PAD_M = 0.02
@@ -173,9 +175,9 @@ def first_hit(velocity: Velocity, points: Points, rule: CollisionMonitorConfig, 
         return None
     # At low speed too, the prediction must reach far enough to show that something near comes nearer.
     seen_s = max(horizon_s, _CREEP_M / fastest)
-    times_s = _times(fastest, seen_s)
+    times_s = steps_s(fastest, seen_s)
     poses = on_a_circle(velocity, times_s)
-    hit = _met(poses, times_s, points, rule, pad_m=_PAD_M, fastest_mps=fastest)
+    hit = met(poses, times_s, points, rule, pad_m=_PAD_M, fastest_mps=fastest)
     return hit if hit and hit.time_s <= horizon_s else None
 
 
@@ -186,20 +188,35 @@ def _met_while_braking(moving: Velocity, target: Velocity, points: Points, rule:
     if fastest < _NOTHING_MPS:
         return None
     # A robot that reverses its direction stops on the way, and has to stop again.
-    times_s = _times(fastest, rule.reaction_time + _braking_s(highest, rule))
+    times_s = steps_s(fastest, rule.reaction_time + _braking_s(highest, rule))
     poses = braking(moving, target, rule, rule.reaction_time, times_s)
-    return _met(poses, times_s, points, rule, pad_m=_PAD_M + _PAD_S * fastest, fastest_mps=fastest)
+    return met(poses, times_s, points, rule, pad_m=_PAD_M + _PAD_S * fastest, fastest_mps=fastest)
 
 
-def _times(fastest_mps: float, seconds: float) -> Points:
+def steps_s(fastest_mps: float, seconds: float) -> Points:
+    """Return times from 0 to ``seconds``, (K,), between which the fastest corner moves by 3 cm, or more if it is far.
+
+    Args:
+        fastest_mps: Speed of the fastest corner, above 0.
+        seconds: The last of them, above 0.
+    """
     steps = min(max(math.ceil(fastest_mps * seconds / _STEP_M), _FEWEST_STEPS), _MOST_STEPS)
     return np.arange(steps + 1, dtype=np.float64) * (seconds / steps)
 
 
-def _met(
+def met(
     poses: Points, times_s: Points, points: Points, rule: CollisionMonitorConfig, *, pad_m: float, fastest_mps: float
 ) -> Hit | None:
-    """Return the first obstacle that the footprint hits along ``poses`` (K, 3) at ``times_s`` (K,), or None."""
+    """Return the first obstacle that the footprint hits along ``poses`` (K, 3) at ``times_s`` (K,), or None.
+
+    Args:
+        poses: x, y and yaw in the base frame of now; the first is zero.
+        times_s: Of the poses, at equal intervals from 0.
+        points: Current obstacles.
+        rule: Size of the footprint.
+        pad_m: How near is a hit; something nearer already is one only if it comes nearer.
+        fastest_mps: Speed of the fastest corner.
+    """
     # Most points stay far away, which a few poses are enough to show.
     beyond_m = pad_m + _NOISE_M + _ROUGHLY * fastest_mps * times_s[1]
     near = points[least_gaps(*seen_from(poses[1::3], points), rule).min(axis=0) <= beyond_m]
@@ -243,6 +260,9 @@ class ObstacleLimiter:
     Attributes:
         rule: As above.
         hit: The obstacle that limited the last command; None if it was not limited, or without a scan.
+        assist: Changes commands before they are limited; None for none.
+        max_angular_radps: The limit of the turns of ``assist``.
+        avoided: The obstacle that ``assist`` steered around; None if it did not.
     """
 
     def __init__(self, rule: CollisionMonitorConfig) -> None:
@@ -252,10 +272,17 @@ class ObstacleLimiter:
         self._moving = self._commanded = ZERO
         self._moving_s = self._commanded_s = -math.inf
         self.hit: Hit | None = None
+        self.assist: Assist | None = None
+        self.max_angular_radps = 0.0
+        self.avoided: Hit | None = None
 
     def see(self, points: Points, measured_s: float) -> None:
         """Store a scan measured at ``measured_s``, in seconds of the caller's clock."""
         self._points, self._measured_s = points, measured_s
+
+    def forget(self) -> None:
+        """Forget the scan: nothing is known until the next one."""
+        self._points = None
 
     def feel(self, moving: Velocity, measured_s: float) -> None:
         """Store the robot's velocity from odometry, measured at ``measured_s``; finite.
@@ -276,12 +303,16 @@ class ObstacleLimiter:
     def limit(self, wanted: Velocity, now_s: float) -> Velocity:
         """Return the velocity to command at ``now_s``: zero without a valid scan, else as :func:`limit`.
 
-        The points are moved by the robot's estimated motion since the scan.
+        With ``assist`` it is a limit of what that makes of ``wanted``. The points are moved by the robot's estimated
+        motion since the scan.
         """
         self._moving, self._moving_s = self._followed(now_s), now_s
-        self.hit, velocity = None, ZERO
+        self.hit, self.avoided, velocity = None, None, ZERO
         if self._points is not None and not self.is_blind(now_s):
             points = after(self._moving, self.silence_s(now_s), self._points)
+            if self.assist is not None:
+                around = Around(points, self._moving, self.rule, self.max_angular_radps)
+                wanted, self.avoided = assisted(self.assist, wanted, around)
             velocity, self.hit = limit(wanted, points, self.rule, self._moving)
         self._commanded, self._commanded_s = velocity, now_s
         return velocity

@@ -1,4 +1,4 @@
-"""Converts signs to velocities, by the tutorial's rule or by that of a cruise control, with limits and a watchdog."""
+"""Converts signs to velocities by the tutorial's rule, with limits and a watchdog."""
 
 import math
 
@@ -123,77 +123,6 @@ class SignControl:
         if config.ramp == "per_message":
             return config.linear_step, config.angular_step
         return config.linear_acceleration * interval_s, config.angular_acceleration * interval_s
-
-
-class CruiseControl(SignControl):
-    """Keeps a set speed, which signs change in steps, and turns while a turn is shown.
-
-    ``Forward`` raises the set speed by a step when it begins, and by another one each ``cruise_step_time`` while it is
-    held; ``Backward`` lowers it; at zero it waits for twice that time. The velocity follows the set speed whatever
-    is shown, so the robot also speeds up in a curve. ``Turn Left`` and ``Turn Right`` turn while they are shown;
-    ``Forward`` and ``Backward`` keep the turn, ``Go`` ends it. ``Stop`` and ``NONE`` command zero at once, and set the
-    speed to zero: nothing shows whose hand comes after a ``NONE``. To keep the speed, change signs through ``Go``.
-    """
-
-    def __init__(self, config: ControlConfig) -> None:
-        super().__init__(config)
-        self._set_mps = 0.0
-        self._shown: Action = "stop"
-        self._shown_s = 0.0
-
-    def reconfigure(self, config: ControlConfig) -> None:
-        """Change the configuration; velocity and set speed are clamped to the new limits."""
-        super().reconfigure(config)
-        self._set_mps = max(-config.max_linear, min(self._set_mps, config.max_linear))
-
-    def hold_back(self, velocity: Velocity) -> None:
-        """Clamp velocity and set speed to the magnitudes in ``velocity``, so that only a sign speeds it up again."""
-        super().hold_back(velocity)
-        self._set_mps = max(-abs(velocity.linear_mps), min(self._set_mps, abs(velocity.linear_mps)))
-
-    def halt(self) -> Velocity | None:
-        """Set velocity and set speed to zero; return one zero, or None if already silent."""
-        self._forget()
-        return super().halt()
-
-    def _forget(self) -> None:
-        self._set_mps, self._shown = 0.0, "stop"
-
-    def _next(self, _sign: str, action: Action, interval_s: float) -> Velocity:
-        config = self._config
-        if action == "stop":
-            self._forget()
-            return ZERO
-        begins = action != self._shown
-        self._shown = action
-        if action in ("forward", "backward"):
-            self._change_set_speed(1.0 if action == "forward" else -1.0, interval_s, begins=begins)
-        now = self.velocity
-        linear = _approach(now.linear_mps, self._set_mps, config.cruise_acceleration * interval_s)
-        turn = min(config.cruise_turn, config.max_angular)
-        wanted = {"turn_left": turn, "turn_right": -turn, "go": 0.0}.get(action, now.angular_radps)
-        angular = _approach(now.angular_radps, wanted, config.cruise_angular_acceleration * interval_s)
-        return Velocity(round(linear, _DIGITS), round(angular, _DIGITS))
-
-    def _change_set_speed(self, way: float, interval_s: float, *, begins: bool) -> None:
-        self._shown_s = 0.0 if begins else self._shown_s + interval_s
-        before, limit = self._set_mps, self._config.max_linear
-        # At zero it waits twice as long, so that braking does not become driving the other way.
-        wait_s = self._config.cruise_step_time * (2.0 if before == 0.0 else 1.0)
-        if not begins:
-            if self._shown_s < wait_s:
-                return
-            self._shown_s -= wait_s
-        after = round(before + way * self._config.cruise_step, _DIGITS)
-        self._set_mps = 0.0 if before * way < 0 <= after * way else max(-limit, min(after, limit))
-
-
-def _approach(now: float, wanted: float, step: float) -> float:
-    """Return ``now`` moved towards ``wanted`` by ``step``, or twice that towards zero."""
-    if now * wanted < 0:
-        wanted = 0.0
-    step = 2 * step if abs(wanted) < abs(now) else step
-    return wanted if abs(wanted - now) <= step else now + math.copysign(step, wanted - now)
 
 
 def _is_faster(after: Velocity, before: Velocity) -> bool:

@@ -1,6 +1,7 @@
 """Base class of all nodes: subscriptions, timers, and the thread that runs their callbacks."""
 
 import functools
+import logging
 import threading
 from collections.abc import Callable, Hashable
 from typing import Any, TypeVar
@@ -9,13 +10,14 @@ from handsteer.clock import Clock
 from handsteer.config import Config
 from handsteer.messages import AUDIT, DIAGNOSTICS, Topic
 from handsteer.nodes.auditing import Auditor
-from handsteer.nodes.callbacks import FailureLog, Inbox, Timer
+from handsteer.nodes.callbacks import FailureLog, Inbox, Queue, Timer
 from handsteer.nodes.diagnostics import write_status
 from handsteer.nodes.journal import Journal
 from handsteer.nodes.status import Status
 from handsteer.transports.base import Call, Publisher, Received, Subscription, Transport
 
 M = TypeVar("M")
+log = logging.getLogger(__name__)
 
 _LOOK_FOR_LISTENERS_S = 0.5
 
@@ -37,6 +39,9 @@ class Node:
 
     Attributes:
         is_quick: Whether all callbacks always return within a fraction of a millisecond.
+        is_managed: Whether a graph with managed nodes may deactivate it (:meth:`set_active`).
+        is_active: Whether it acts on what it receives. While it does not, callbacks and timers go on; the node itself
+            ensures that nothing follows from them.
         ended: Set when the node has finished.
         callback_errors: Number of failed callbacks.
         stuck: True if a callback was still running when :meth:`stop` timed out.
@@ -44,6 +49,8 @@ class Node:
     """
 
     is_quick = False
+    is_managed = False
+    is_active = True
     journal: Journal | None = None
 
     def __init__(self, name: str, transport: Transport, clock: Clock) -> None:
@@ -87,6 +94,7 @@ class Node:
         topic: Topic[M],
         callback: Callable[[Received[M]], None],
         key: Callable[[M], Hashable] | None = None,
+        queue: Queue[M] | None = None,
     ) -> Subscription:
         """Call ``callback`` with the newest message of ``topic``; older unprocessed messages are dropped.
 
@@ -96,13 +104,14 @@ class Node:
             topic: What to subscribe to.
             callback: Runs on this node's thread.
             key: For a topic with several publishers: keeps the newest message for each value of ``key(message)``.
+            queue: Where messages wait that are processed each, in order; one in each spin.
 
         Returns:
             Ends the subscription when closed; so does the end of the node.
         """
         name = self.transport.topic_name(topic)
         self._topics["listens to"].add(name)
-        inbox = Inbox(name, callback, key, 1 if key else topic.depth)
+        inbox = Inbox(name, callback, key, 1 if key else topic.depth, queue)
         self._inboxes.append(inbox)
 
         def deliver(received: Received[M]) -> None:
@@ -224,6 +233,26 @@ class Node:
             if is_free:
                 self._serving.release()
 
+    def set_active(self, is_active: bool, timeout_s: float = 1.0) -> bool:
+        """Activate or deactivate the node, between two of its callbacks; return whether it has happened.
+
+        When it returns, what the node publishes last was published. May be called from any thread but the node's.
+
+        Args:
+            is_active: The new state; setting the current one has no effect.
+            timeout_s: How long to wait for a running callback.
+        """
+        if not self._serving.acquire(timeout=timeout_s):
+            return False
+        try:
+            if is_active != self.is_active:
+                self._guard("lifecycle", self.on_activate if is_active else self.on_deactivate)
+                self.is_active = is_active
+                log.info("%s is %s", self.name, "active" if is_active else "deactivated")
+        finally:
+            self._serving.release()
+        return True
+
     def check(self, config: Config) -> None:
         """Raise ConfigError if :meth:`reconfigure` could not apply ``config``; may be called from any thread."""
 
@@ -233,6 +262,12 @@ class Node:
     def services(self) -> dict[str, Call]:
         """Return the services of this node by name; by default there are none."""
         return {}
+
+    def on_activate(self) -> None:
+        """Begin again: what was received before says nothing of now."""
+
+    def on_deactivate(self) -> None:
+        """Publish what others need to know last."""
 
     def on_stop(self) -> None:
         """Clean up; called last, also after an exception."""

@@ -53,29 +53,77 @@ class Inbox(Generic[M]):
         callback: Processes each message.
         key: Returns what distinguishes several publishers, whose newest messages are kept each; None for one publisher.
         depth: How many messages are kept, of each publisher.
+        queue: Where messages wait that are processed each, in order; None if there are none.
     """
 
     topic: str
     callback: Callable[[Received[M]], None]
     key: Callable[[M], Hashable] | None
     depth: int = 1
+    queue: "Queue[M] | None" = None
     _newest: dict[Hashable, deque[Received[M]]] = field(default_factory=dict)
 
     @property
     def filled(self) -> bool:
         """Whether messages wait."""
-        return bool(self._newest)
+        return bool(self._newest or self.queue)
 
     def put(self, received: Received[M]) -> None:
         """Add a message; the oldest one beyond the depth is dropped."""
+        if self.queue is not None and self.queue.takes(received):
+            self.queue.put(received, self.topic)
+            return
         key = self.key(received.message) if self.key else None
         self._newest.setdefault(key, deque(maxlen=self.depth)).append(received)
 
     def take(self) -> list[Received[M]]:
-        """Remove and return all messages, oldest first."""
+        """Remove and return all messages, oldest first, but only one of the queue: timers must not wait for many."""
         taken = [received for waiting in self._newest.values() for received in waiting]
         self._newest.clear()
-        return taken
+        return [self.queue.take(), *taken] if self.queue else taken
+
+
+class Queue(Generic[M]):
+    """Messages that are processed each, in order, up to a total size; beyond it, new ones are dropped with a warning.
+
+    Args:
+        takes: Returns whether a message belongs into it; called on the thread that delivers.
+        size: Returns the size of a message in bytes.
+        most_bytes: The total size; one message always fits.
+        advice: What to do when it is full, for the warning.
+    """
+
+    def __init__(
+        self, takes: Callable[[Received[M]], bool], size: Callable[[M], int], most_bytes: int, advice: str
+    ) -> None:
+        self.takes = takes
+        self._size = size
+        self._most_bytes = most_bytes
+        self._advice = advice
+        self._waiting: deque[Received[M]] = deque()
+        self._bytes = 0
+        self._is_full = False
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def put(self, received: Received[M], topic: str) -> None:
+        """Add a message of the topic named ``topic``."""
+        size = self._size(received.message)
+        if self._waiting and self._bytes + size > self._most_bytes:
+            if not self._is_full:
+                log.warning("%s: %d messages wait, and new ones are dropped: %s", topic, len(self), self._advice)
+            self._is_full = True
+            return
+        self._waiting.append(received)
+        self._bytes += size
+
+    def take(self) -> Received[M]:
+        """Remove and return the oldest message."""
+        received = self._waiting.popleft()
+        self._bytes -= self._size(received.message)
+        self._is_full = self._is_full and bool(self._waiting)
+        return received
 
 
 class FailureLog:

@@ -30,6 +30,8 @@ _DIAGNOSE_PERIOD_S = 0.5
 _SILENT_AFTER_S = 1.0
 _FIRST_RETRY_S = 0.5
 _LONGEST_RETRY_S = 8.0
+_COMPARED_ROWS = 30
+"""Enough to report a frozen camera; it is the recognition that keeps old pictures from moving a robot."""
 
 log = logging.getLogger(__name__)
 
@@ -71,7 +73,7 @@ class CameraNode(Node):
         self._fits = True
         self._retry_s = _FIRST_RETRY_S
         self._status = CameraStatus(camera.name)
-        self._freshness = Freshness()
+        self._freshness = Freshness(_COMPARED_ROWS)
         self._last_read_s = clock.now()
         self._is_frozen = False
         StopKeeper(self)

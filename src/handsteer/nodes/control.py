@@ -6,9 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 from handsteer.clock import Clock
-from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, JoyConfig
+from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, JoyConfig, assist_of
 from handsteer.control import Control
 from handsteer.control.actions import AddedActions
+from handsteer.control.assist import assist_named
 from handsteer.control.engagement import SteeredBy
 from handsteer.control.explain import Reason, seconds_to_renew
 from handsteer.control.following import Following
@@ -29,6 +30,8 @@ from handsteer.messages import (
     Topic,
     Twist,
     engages_in,
+    pointing_in,
+    stick_in,
 )
 from handsteer.nodes.auditing import ControlAudit
 from handsteer.nodes.base import Node
@@ -63,7 +66,7 @@ class HandSignControlNode(Node):
     Args:
         config: Limits, steps and timeouts.
         cmd_vel: Topic of the commands, with Twist, TwistStamped or either.
-        collision_monitor: Whether and how to slow commands before obstacles; disabled by default.
+        collision_monitor: The size of the robot and how it brakes, for ``config.assist``.
         gamepad: How ``/joy`` is read.
         arming: Whether nothing moves before neutral was seen, or while no robot is subscribed
             (:mod:`handsteer.control.safety`).
@@ -78,7 +81,7 @@ class HandSignControlNode(Node):
         latency: From the capture of a frame to the resulting Twist.
     """
 
-    is_quick = True
+    is_quick = is_managed = True
 
     def __init__(
         self,
@@ -112,7 +115,7 @@ class HandSignControlNode(Node):
         self._last_step_s = clock.now()
         self._camera_since_s = -math.inf
         rule = collision_monitor or CollisionMonitorConfig()
-        self._monitor = CollisionMonitor(self, rule, self._mux.hold_back, scan, odom)
+        self._monitor = CollisionMonitor(self, config, rule, self._mux.hold_back, scan=scan, odom=odom)
         self._stall_guard = StallGuard(config.sign_timeout, clock.now())
         self._last_sign = NONE
         self._selection = (
@@ -136,34 +139,51 @@ class HandSignControlNode(Node):
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 
     def check(self, config: Config) -> None:
-        """Raise ConfigError if an action of ``control.actions`` is of a plug-in, and cannot be made."""
+        """Raise ConfigError if an action of ``control.actions``, or the assist, is of a plug-in and cannot be made."""
         try:
             AddedActions().make(config.control.actions.values())
         except PluginError as error:
             raise ConfigError(f"control.actions: {error}") from None
+        try:
+            assist_named(assist_of(config.control, config.collision_monitor))
+        except PluginError as error:
+            raise ConfigError(f"control.assist: {error}") from None
 
     def on_reconfigure(self, config: Config) -> None:
         """Apply all of ``control``; a robot that exceeds new limits is slowed at once."""
         self._config = config.control
         self._stall_guard.limit_s = config.control.sign_timeout
-        self._monitor.reconfigure(config.collision_monitor)
+        self._monitor.reconfigure(config.control, config.collision_monitor)
         self._publish(self._control.reconfigure(config.control))
         self._listen()
 
     def _listen(self) -> None:
-        is_joystick = self._config.mode == "joystick"
         by_gesture = self._engages and self._config.engage_by == "gesture"
-        self._joysticks.listen(hand=is_joystick or by_gesture, gamepad=is_joystick)
+        self._joysticks.listen(hand=self._config.by_stick or by_gesture, gamepad=self._config.mode == "joystick")
 
     def services(self) -> dict[str, Call]:
-        """Return ``stop`` and ``reset``, which are equivalent to true and false on ``/stop``."""
+        """Return ``stop`` and ``reset``, as true and false on ``/stop``, and ``engage_state``: is the hand engaged?"""
         publisher = self.publisher(STOP)
 
         def publish(is_stopped: bool) -> str:
             publisher.publish(Bool(data=is_stopped))
             return "stopped, until it is reset" if is_stopped else "reset"
 
-        return {"stop": lambda: publish(True), "reset": lambda: publish(False)}
+        return {"stop": lambda: publish(True), "reset": lambda: publish(False), "engage_state": self._engage_state}
+
+    def _engage_state(self) -> str:
+        engagement = self._safety.engagement
+        return "engaged" if engagement.engaged else f"disengaged: {engagement.reason}"
+
+    def on_activate(self) -> None:
+        """Wait for neutral, and for the gesture that engages: what was shown before does not count."""
+        self._control.halt()
+        self._safety.disarm("was activated")
+
+    def on_deactivate(self) -> None:
+        """Stop the robot; from then on nothing is commanded."""
+        self._publish(self._control.halt())
+        self._look_for_changes(self.clock.now())
 
     def on_stop(self) -> None:
         """Stop the robot, and those that were selected a moment ago."""
@@ -200,15 +220,13 @@ class HandSignControlNode(Node):
         self._publish(self._control.halt())
         self._look_for_changes(self.clock.now())
 
-    def _on_stick(self, stick: Stick, received: Received[Joy]) -> None:
-        """Note whether the hand engages; follow it as a joystick if it is one."""
+    def _on_stick(self, received: Received[Joy]) -> None:
+        """Note whether the hand engages; follow it if it drives as a joystick or by pointing."""
         is_old = self._is_stale(received) or self._waits_for_others()
         self._control.note_gesture(is_done=engages_in(received.message) and not is_old)
-        if self._config.mode == "joystick":
-            self._follow_stick(stick, received)
-
-    def _follow_stick(self, stick: Stick, received: Received[Joy]) -> None:
-        self._take(received.captured_s, is_late=self._is_stale(received), is_stop=not stick.held, stick=stick)
+        if self._config.by_stick:
+            stick = (stick_in if self._config.mode == "joystick" else pointing_in)(received.message)
+            self._take(received.captured_s, is_late=self._is_stale(received), is_stop=not stick.held, stick=stick)
 
     def _on_gamepad(self, stick: Stick, received: Received[Joy], *, is_at_rest: bool) -> None:
         """Follow a gamepad; one that stays at rest leaves the robot to others, and was seen released."""
@@ -245,6 +263,8 @@ class HandSignControlNode(Node):
         by: SteeredBy = "steering",
     ) -> None:
         """Follow an input; a late one can only stop: it does not show what is seen now, so it does not arm."""
+        if not self.is_active:
+            return
         if self._waits_for_others():
             self._publish(ZERO, captured_s)
         elif is_late:
@@ -272,6 +292,9 @@ class HandSignControlNode(Node):
 
     def _watch(self) -> None:
         elapsed_s = self._elapsed()
+        if not self.is_active:
+            self._look_for_changes(self._last_step_s)
+            return
         self._look_after_the_robot(elapsed_s)
         self._publish(self._control.step(elapsed_s))
         self._look_for_changes(self._last_step_s)
@@ -321,7 +344,7 @@ class HandSignControlNode(Node):
         self._cmd_vel = self._selection.commands
 
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
-        if velocity is None:
+        if velocity is None or not self.is_active:
             return
         self._commanded = self._monitor.admit(velocity)
         self._cmd_vel.send(self._commanded.linear_mps, self._commanded.angular_radps, captured_s)
@@ -340,7 +363,7 @@ class HandSignControlNode(Node):
         return elapsed_s
 
     def _report(self) -> ControlStatus:
-        velocity = self._mux.velocity
+        velocity = self._commanded if self._monitor.steers else self._mux.velocity
         # There are no latencies if the transport does not carry capture times with signs.
         is_measured = len(self.latency) > 0
         return ControlStatus(
@@ -374,6 +397,8 @@ class HandSignControlNode(Node):
         safety = self._safety
         if safety.is_stopped:
             return Reason("stopped")
+        if not self.is_active:
+            return Reason("inactive")
         if self._waits_for_others():
             return Reason("starting")
         if why_blind := self._monitor.why_blind():

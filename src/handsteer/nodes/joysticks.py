@@ -15,8 +15,6 @@ from handsteer.types import Stick
 
 log = logging.getLogger(__name__)
 
-OnStick = Callable[[Stick, Received[Joy]], None]
-
 
 class OnGamepad(Protocol):
     """Receives the states of a gamepad."""
@@ -32,12 +30,19 @@ class Joysticks:
     Args:
         node: The control.
         hand: Topic of the hand as a joystick.
-        on_hand: Receives each of its states.
+        on_hand: Receives each of its messages.
         rule: How the gamepad's messages are read.
         on_gamepad: Receives each state of the gamepad; a message whose stamp does not advance is not another one.
     """
 
-    def __init__(self, node: Node, hand: Topic[Joy], on_hand: OnStick, rule: JoyConfig, on_gamepad: OnGamepad) -> None:
+    def __init__(
+        self,
+        node: Node,
+        hand: Topic[Joy],
+        on_hand: Callable[[Received[Joy]], None],
+        rule: JoyConfig,
+        on_gamepad: OnGamepad,
+    ) -> None:
         self._node, self._hand = node, hand
         self._on_hand, self._on_gamepad = on_hand, on_gamepad
         self._rule = rule.model_dump()
@@ -49,7 +54,7 @@ class Joysticks:
         """Subscribe to what is wanted, and unsubscribe from the rest; without effect if that is so already."""
         if not gamepad:
             self._is_gamepad_held = False
-        self._listen(self._hand, hand, lambda received: self._on_hand(stick_in(received.message), received))
+        self._listen(self._hand, hand, self._on_hand)
         self._listen(JOY, gamepad, self._take)
 
     def _listen(self, topic: Topic[Joy], on: bool, deliver: Callable[[Received[Joy]], None]) -> None:

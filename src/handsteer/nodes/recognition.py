@@ -4,13 +4,14 @@ import logging
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.clock import Clock
-from handsteer.config import Config, SignsConfig
+from handsteer.config import Config, JoystickConfig, SignsConfig
+from handsteer.control.explain import Reason
 from handsteer.errors import ConfigError, ModelError, ProfileError
 from handsteer.images import bgr_image, image_message, jpeg_picture, mirrored
 from handsteer.messages import (
@@ -18,6 +19,8 @@ from handsteer.messages import (
     HAND_SIGN,
     IMAGE_ANNOTATED,
     IMAGE_COMPRESSED,
+    IMAGE_DRAWN,
+    IMAGE_LANDMARKS,
     IMAGE_RAW,
     CompressedImage,
     Header,
@@ -28,15 +31,27 @@ from handsteer.messages import (
     joy_of,
 )
 from handsteer.nodes.base import Node
+from handsteer.nodes.callbacks import Queue
 from handsteer.nodes.status import RecognitionStatus
 from handsteer.nodes.supervision import StopKeeper
-from handsteer.nodes.timing import CALM_S, TOO_SLOW, FrameAge, LatencyLog, Recording, StallGuard, far_and_late
+from handsteer.nodes.timing import (
+    CALM_S,
+    TOO_SLOW,
+    FrameAge,
+    LatencyLog,
+    PlayedTime,
+    Recording,
+    StallGuard,
+    far_and_late,
+)
 from handsteer.pipeline import FramePipeline
 from handsteer.recognition.engage_gesture import EngageGesture
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.hand_joystick import HandJoystick
+from handsteer.recognition.pointing import Pointing
 from handsteer.recognition.profile import profile_path
 from handsteer.recognition.recognizer import Recognition, Recognizer, annotate, open_classifier
+from handsteer.timeouts import PLAYED_S
 from handsteer.transports.base import Received, Subscription, Transport
 from handsteer.types import NONE, RELEASED, Handedness
 
@@ -49,6 +64,11 @@ _CHOOSE_PERIOD_S = 0.5
 log = logging.getLogger(__name__)
 
 M = TypeVar("M", Image, CompressedImage)
+
+# Ten seconds of raw images of 640x480 at 30 a second, and minutes of JPEG.
+_MOST_PLAYED_BYTES = 2**28
+_REPORT_PLAYED_S = 5.0
+_SLOWER = "the recording is played faster than this machine recognises: play it at a lower rate (-r 0.5)"
 
 _FREEZE_EXPLAINED_S = 3.0
 # An older refusal no longer explains why there are no frames.
@@ -65,9 +85,10 @@ class HandSignRecognitionNode(Node):
     Args:
         recognizer: Recognises the signs.
         config: Maximum age of a frame, and which images to subscribe to.
-        joystick: The hand as a joystick, with the default parameters when None.
+        joystick: Parameters of the hand as a joystick, and of where it points; the defaults when None.
+        points: Whether the pictures show where the hand points, instead of the hand as a joystick.
         image, compressed: Topics of the frames, and of the same as JPEG.
-        sign, joy: Topics of the signs, and of the hand as a joystick.
+        sign, joy: Topics of the signs, and of the hand as a joystick and where it points.
         camera_changed: Topic on which it is published that another camera was chosen; none where it cannot be.
 
     Attributes:
@@ -77,6 +98,8 @@ class HandSignRecognitionNode(Node):
             may be set on any thread.
     """
 
+    is_managed = True
+
     def __init__(
         self,
         transport: Transport,
@@ -84,7 +107,8 @@ class HandSignRecognitionNode(Node):
         recognizer: Recognizer,
         config: SignsConfig,
         *,
-        joystick: HandJoystick | None = None,
+        joystick: JoystickConfig | None = None,
+        points: bool = False,
         image: Topic[Image] = IMAGE_RAW,
         compressed: Topic[CompressedImage] = IMAGE_COMPRESSED,
         sign: Topic[String] = HAND_SIGN,
@@ -95,16 +119,19 @@ class HandSignRecognitionNode(Node):
         self.counts: dict[str, int] = {}
         self.processing = LatencyLog()
         self.is_camera_far = False
-        self._pipeline = FramePipeline(recognizer, joystick or HandJoystick(), EngageGesture())
+        sticks = HandJoystick(joystick), Pointing(joystick)
+        self._pipeline = FramePipeline(recognizer, *sticks, EngageGesture())
+        self._points = points
         self._config = config
         self._models = _versions_of(config)
         self._last_captured_s: float | None = None
         self._last_frame_s = clock.now()
         self._last_sign_s = clock.now()
+        self._last_played_s = -math.inf
         self._last_hand_s: float | None = None
         self._age = FrameAge(config.max_frame_age, one_clock=transport.is_one_machine)
         self._stall_guard = StallGuard(config.max_frame_age, clock.now())
-        self._recording = Recording(config.recorded, config.max_frame_age)
+        self._recording, self._played = Recording(config.recorded), PlayedTime(config.max_frame_age)
         self._refused: str | None = None
         self._has_explained_freeze = False
         self._refused_s = -math.inf
@@ -113,7 +140,8 @@ class HandSignRecognitionNode(Node):
         StopKeeper(self)
         self._sign = self.publisher(sign)
         self._joy = self.publisher(joy)
-        self._annotated = self.publisher(IMAGE_ANNOTATED)
+        pictures = (IMAGE_ANNOTATED, IMAGE_LANDMARKS, IMAGE_DRAWN)
+        self._pictures = tuple((topic, self.publisher(topic)) for topic in pictures)
         self._frames, self._jpegs = image, compressed
         wanted = config.image_transport
         self._compressed = wanted == "compressed" or (wanted == "auto" and transport.crosses_network)
@@ -154,9 +182,10 @@ class HandSignRecognitionNode(Node):
             self._models = versions
         self._config = config.signs
         limit_s = config.signs.max_frame_age
-        self._age.limit_s = self._recording.limit_s = self._stall_guard.limit_s = limit_s
+        self._age.limit_s = self._played.limit_s = self._stall_guard.limit_s = limit_s
         self._pipeline.recognizer.reconfigure(config.signs)
-        self._pipeline.joystick.reconfigure(config.joystick)
+        self._pipeline.reconfigure(config.joystick)
+        self._points = config.control.points
 
     def _has_other_models(self, config: SignsConfig) -> bool:
         return any(
@@ -168,15 +197,18 @@ class HandSignRecognitionNode(Node):
     def _on_other_camera(self, received: Received[String]) -> None:
         """Forget the hand, and what it showed to the camera before."""
         self._camera_since_s = self.clock.now() if received.captured_s is None else received.captured_s
-        self._pipeline.forget()
-        self._recognition = None
+        self._forget()
 
     def _on_frame(self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]]) -> None:
+        if not self.is_active:
+            return
         began_s = self.clock.now()
         captured_s = received.captured_s if received.captured_s is not None else began_s
         self._stall_guard.note(began_s)
         if self._recording.follows(began_s, captured_s, by_player=received.by_player):
-            captured_s = began_s
+            self._on_played(picture_of(received.message), received, began_s)
+            return
+        self._played.end()
         self._refused = self._age.why_refused(began_s, captured_s, is_far=self.is_camera_far)
         if self._refused is not None:
             self._refused = self._recording.hint(began_s) or self._refused
@@ -185,23 +217,40 @@ class HandSignRecognitionNode(Node):
         if self._refused is None and self._stall_guard.distrusts(began_s):
             self._refused = f"{TOO_SLOW}: pictures may have waited"
         image = picture_of(received.message)
-        if self._config.swap_sides:
-            image = mirrored(image)
         if self._refused is None:
-            self._look_at(image, received, began_s, captured_s)
+            self._look_at(image, received, began_s, self._since_last_frame(captured_s))
         else:
-            self._pipeline.pass_over(image)
+            self._pipeline.pass_over(mirrored(image) if self._config.swap_sides else image)
         if self._refused is not None:
             self._refused_s = began_s  # a stale or repeated frame does not count: the watchdog publishes NONE
 
-    def _look_at(self, image: NDArray[np.uint8], received: Received[M], began_s: float, captured_s: float) -> None:
-        is_joystick_wanted = self._joy.has_subscribers
+    def _on_played(self, image: NDArray[np.uint8], received: Received[M], began_s: float) -> None:
+        """Process a frame of a recording: the result depends on the frames and their stamps alone."""
+        since_last_s = self._played.since_last(received.message.header.stamp)
+        if since_last_s is None:
+            self._pipeline.begin_again()
+            self._played.report()
+        elif since_last_s > self._config.max_frame_age:
+            self._forget()
+        self._last_captured_s = None
+        self._look_at(image, received, began_s, since_last_s or 0.0)
+        is_new, seen = self._refused is None, self._recognition
+        self._played.count(seen.sign if is_new and seen is not None else "not new")
+        if self._played.note(since_last_s or 0.0, counts=is_new):
+            self._publish_none(began_s)
+        if self._refused is not None:
+            self._refused_s = began_s
+        self._last_sign_s = self._last_played_s = self.clock.now()
+
+    def _look_at(self, image: NDArray[np.uint8], received: Received[M], began_s: float, since_last_s: float) -> None:
+        image = mirrored(image) if self._config.swap_sides else image
+        is_joystick_wanted, is_played = self._joy.has_subscribers, self._recording.is_followed
         sight = self._pipeline.step(
             image,
-            self._since_last_frame(captured_s),
-            recorded=self._recording.is_followed,
+            since_last_s,
+            recorded=is_played,
             as_joystick=is_joystick_wanted,
-            why_too_late=lambda: self._why_too_late(began_s),
+            why_too_late=lambda: None if is_played else self._why_too_late(began_s),
         )
         self._refused, recognition = sight.refused, sight.recognition
         self._explain_freeze()
@@ -215,14 +264,18 @@ class HandSignRecognitionNode(Node):
         self.counts[recognition.sign] = self.counts.get(recognition.sign, 0) + 1
         self._sign.publish(String(data=recognition.sign), received.captured_s)
         if is_joystick_wanted:
-            message = joy_of(sight.stick, received.message.header, engages=sight.engages)
+            header = received.message.header
+            if is_played:  # it drives now
+                header = Header(stamp=self.clock.stamp(began_s), frame_id=header.frame_id)
+            message = joy_of(sight.stick, header, engages=sight.engages, pointing=sight.pointing)
             self._joy.publish(message, received.captured_s)
         self.processing.add(self.clock.now() - began_s)
-        if self._annotated.has_subscribers:
-            header = received.message.header
-            picture = annotate(image, recognition)
-            self._pipeline.joystick.draw(picture)
-            self._annotated.publish(image_message(picture, header), received.captured_s)
+        for topic, publisher in self._pictures:
+            if publisher.has_subscribers:
+                ground = np.zeros_like(image) if topic is IMAGE_DRAWN else image
+                picture = annotate(ground, recognition, names_sign=topic is IMAGE_ANNOTATED)
+                self._pipeline.draw(picture, points=self._points)
+                publisher.publish(image_message(picture, received.message.header), received.captured_s)
 
     def _explain_freeze(self) -> None:
         if not self._has_explained_freeze and self._pipeline.frozen_s > _FREEZE_EXPLAINED_S:
@@ -240,9 +293,16 @@ class HandSignRecognitionNode(Node):
         return f"{TOO_SLOW}: a picture was {age_s:.1f} s old when its sign was known"
 
     def _take_images(self) -> Subscription:
+        played: Queue[Any] = Queue(self._is_played, lambda image: int(image.data.size), _MOST_PLAYED_BYTES, _SLOWER)
         if self._compressed:
-            return self.subscribe(self._jpegs, lambda received: self._on_frame(received, jpeg_picture))
-        return self.subscribe(self._frames, lambda received: self._on_frame(received, bgr_image))
+            return self.subscribe(self._jpegs, lambda received: self._on_frame(received, jpeg_picture), queue=played)
+        return self.subscribe(self._frames, lambda received: self._on_frame(received, bgr_image), queue=played)
+
+    def _is_played(self, received: Received[Any]) -> bool:
+        """Return whether a frame that arrives is a recording's, which are processed each; of others, the newest is."""
+        asks_age = self._config.recorded == "always" and received.captured_s is not None
+        age_s = self.clock.now() - (received.captured_s or 0.0) if asks_age else 0.0
+        return self._recording.means(age_s, by_player=received.by_player)
 
     def _choose_images(self) -> None:
         """Subscribe to the other kind of images if a camera has only that, or a recording asks for it."""
@@ -271,19 +331,39 @@ class HandSignRecognitionNode(Node):
     def _watch(self) -> None:
         now = self.clock.now()
         self._stall_guard.note(now)
-        if now - self._last_frame_s <= self._config.max_frame_age:
+        has_played = now - self._last_played_s <= PLAYED_S
+        if now - self._last_played_s > _REPORT_PLAYED_S:
+            self._played.report()
+        if not self.is_active or has_played or now - self._last_frame_s <= self._config.max_frame_age:
             return
         period_s = _SILENCE_PERIOD_S if self._recognition is None else self._config.max_frame_age
         if now - self._last_sign_s > period_s:
             self._last_sign_s = now
-            self._pipeline.forget()
-            self._recognition = None
-            self._sign.publish(String(data=NONE))
-            if self._joy.has_subscribers:
-                self._joy.publish(joy_of(RELEASED, Header(stamp=self.clock.stamp(now), frame_id="")))
+            self._publish_none(now)
+
+    def _publish_none(self, now_s: float) -> None:
+        self._forget()
+        self._sign.publish(String(data=NONE))
+        if self._joy.has_subscribers:
+            self._joy.publish(joy_of(RELEASED, Header(stamp=self.clock.stamp(now_s), frame_id="")))
+
+    def on_activate(self) -> None:
+        """Begin with the next frame."""
+        self._played.end()
+        self._pipeline.begin_again()
+
+    def on_deactivate(self) -> None:
+        """Publish that no sign is seen."""
+        self._publish_none(self.clock.now())
+
+    def _forget(self) -> None:
+        self._pipeline.forget()
+        self._recognition = None
 
     def _report(self) -> RecognitionStatus:
         now, seen = self.clock.now(), self._recognition
+        if not self.is_active:
+            return RecognitionStatus(signs=self._pipeline.recognizer.signs, refused=Reason("inactive").explanation)
         if seen is None:
             refuses_now = self._refused is not None and now - self._refused_s <= self._config.max_frame_age
             no_frame_s = None if refuses_now else round(now - max(self._last_frame_s, self._refused_s), 1)

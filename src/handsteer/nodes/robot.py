@@ -219,6 +219,7 @@ class RobotNode(Node):
             path_length_m=round(self.path_length_m, 2),
             truth=Pose2D(round(state.truth.x, 3), round(state.truth.y, 3), round(state.truth.yaw, 3)),
             course=self._surroundings.course,
+            world=self.world.name if self.world is not None else "",
             warning=self._rivals.warning or None,
             trouble=state.trouble,
             touches=state.contacts,

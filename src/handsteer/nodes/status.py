@@ -213,6 +213,7 @@ class RobotStatus(Status):
         path_length_m: Distance driven.
         truth: Actual pose in the world; None if unknown.
         course: Progress on its world's course; None without one.
+        world: Name of its world; empty for a real robot.
         warning: A problem that does not stop operation; None if there is none.
         trouble: What is wrong, to be read after "the robot"; empty if nothing is.
         touches: Names of the obstacles that it touches.
@@ -225,6 +226,7 @@ class RobotStatus(Status):
     path_length_m: float | None = None
     truth: Pose2D | None = None
     course: CourseState | None = None
+    world: str = ""
     warning: str | None = None
     trouble: str = ""
     touches: tuple[str, ...] = ()

@@ -7,6 +7,7 @@ import numpy as np
 
 from handsteer.clock import ClockWatch
 from handsteer.config import Recorded
+from handsteer.messages import Time
 from handsteer.timeouts import BURST_S, DISTRUST_S, RECORDED_S, RESYNC_S, STALE_S
 
 log = logging.getLogger(__name__)
@@ -135,23 +136,26 @@ class Recording:
     Args:
         recorded: auto accepts what a player publishes; always accepts also stamps older than any link delay; never
             accepts nothing.
-        limit_s: Frames that are not older than this, in seconds, are not a recording's.
 
     Attributes:
-        limit_s: As above; may be changed.
         is_followed: Whether the last frame was accepted as a recording's.
     """
 
-    def __init__(self, recorded: Recorded, limit_s: float) -> None:
+    def __init__(self, recorded: Recorded) -> None:
         self._recorded = recorded
-        self.limit_s = limit_s
         self.is_followed = False
         self._captured_s: float | None = None
         self._in_step_since: tuple[float, float] | None = None
         self._is_logged = False
 
+    def means(self, age_s: float, *, by_player: bool) -> bool:
+        """Return whether a frame whose stamp is so old, in seconds, is meant as a recording's; on any thread."""
+        if self._recorded == "auto":
+            return by_player
+        return self._recorded == "always" and (by_player or age_s > RECORDED_S)
+
     def follows(self, now_s: float, captured_s: float, *, by_player: bool) -> bool:
-        """Record a frame; return whether it is accepted as a recording's, captured now.
+        """Record a frame; return whether it is accepted as a recording's, whenever it arrives.
 
         Args:
             now_s: Current time, in seconds of the graph's clock.
@@ -161,10 +165,8 @@ class Recording:
         age_s = now_s - captured_s
         stands, self._captured_s = captured_s == self._captured_s, captured_s
         self._note_step(now_s, age_s)
-        meant = by_player if self._recorded == "auto" else self._recorded == "always"
-        long_ago = age_s > (self.limit_s if by_player else RECORDED_S)
         # A stamp that does not advance comes from a camera or clock that has failed.
-        self.is_followed = meant and long_ago and not stands
+        self.is_followed = self.means(age_s, by_player=by_player) and not stands
         if self.is_followed:
             self._log_once(
                 logging.INFO, f"frames are stamped {duration_in_words(age_s)} ago: they are followed, as a recording's"
@@ -194,6 +196,52 @@ class Recording:
         if not self._is_logged:
             log.log(level, message)
         self._is_logged = True
+
+
+class PlayedTime:
+    """Time as the stamps of played frames have it, however long these have waited, so that it never differs.
+
+    Args:
+        limit_s: Frames that are further apart, in seconds, are not of one stream.
+
+    Attributes:
+        limit_s: As above; may be changed.
+    """
+
+    def __init__(self, limit_s: float) -> None:
+        self.limit_s = limit_s
+        self._last_ns: int | None = None
+        self._unseen_s = 0.0
+        self._counts: dict[str, int] = {}
+
+    def count(self, sign: str) -> None:
+        """Record what a frame showed."""
+        self._counts[sign] = self._counts.get(sign, 0) + 1
+
+    def report(self) -> None:
+        """Log what was played since the last report, if anything was."""
+        if self._counts:
+            signs = ", ".join(f"{sign} {count}" for sign, count in self._counts.items())
+            log.info("%d images of a recording: %s", sum(self._counts.values()), signs)
+        self._counts = {}
+
+    def since_last(self, stamp: Time) -> float | None:
+        """Return the seconds since the frame before; None for the first one, also of a recording that starts again."""
+        stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+        last_ns, self._last_ns = self._last_ns, stamp_ns
+        if last_ns is None or stamp_ns < last_ns:
+            self._unseen_s = 0.0
+            return None
+        return (stamp_ns - last_ns) / 1e9
+
+    def note(self, since_last_s: float, *, counts: bool) -> bool:
+        """Record whether a frame has a sign; return whether none had one for too long."""
+        self._unseen_s = 0.0 if counts else self._unseen_s + since_last_s
+        return self._unseen_s > self.limit_s
+
+    def end(self) -> None:
+        """Forget the recording: a live frame has come."""
+        self._last_ns = None
 
 
 def duration_in_words(seconds: float) -> str:

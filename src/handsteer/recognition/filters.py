@@ -1,4 +1,4 @@
-"""Filters over time: the active hand of several, the likelihoods of the last frames, and the confirmed sign."""
+"""Filters over time: the active hand of several, the likelihoods of the last frames, the confirmed sign, positions."""
 
 import math
 from collections import deque
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handsteer.config import SignsConfig
 from handsteer.recognition.features import PALM
@@ -21,6 +22,9 @@ _MUCH_SMALLER: Final = 0.6
 _FRAMES: Final = 12
 _STILL: Final = 0.25
 """Largest movement of a still hand during the confirmation, in hand sizes; chosen, not measured."""
+
+_SPEED_HZ: Final = 1.0
+"""Cutoff frequency for the speed in the One-Euro filter, as its authors have it."""
 
 # The stamps of periodic frames jitter: without slack, rounding would decide about a whole frame.
 _SLACK_S = 0.001
@@ -256,3 +260,39 @@ class Debouncer:
     def _accept(self, sign: str) -> None:
         self.sign, self.candidate = sign, NONE
         self.candidate_s = self._unseen_s = 0.0
+
+
+class OneEuro:
+    """The One-Euro filter: a low-pass whose cutoff rises with speed (Casiez, Roussel and Vogel, CHI 2012).
+
+    Args:
+        value: The first value, (n,).
+    """
+
+    def __init__(self, value: NDArray[np.float64]) -> None:
+        self._value = value
+        self._raw = value
+        self._speed = np.zeros_like(value)
+
+    def step(self, raw: NDArray[np.float64], dt_s: float, min_cutoff_hz: float, beta: float) -> NDArray[np.float64]:
+        """Return the filtered value.
+
+        Args:
+            raw: The next value, (n,).
+            dt_s: Seconds since the last one, >= 0.
+            min_cutoff_hz: Cutoff frequency at rest.
+            beta: Its increase with speed, in Hz per unit a second.
+        """
+        if dt_s <= 0:
+            return self._value
+        speed = (raw - self._raw) / dt_s
+        self._raw = raw
+        self._speed = self._speed + _share(_SPEED_HZ, dt_s) * (speed - self._speed)
+        share = _share(min_cutoff_hz + beta * float(np.linalg.norm(self._speed)), dt_s)
+        self._value = self._value + share * (raw - self._value)
+        return self._value
+
+
+def _share(cutoff_hz: float, dt_s: float) -> float:
+    """Return the weight of a new value in a first-order low-pass."""
+    return 1.0 / (1.0 + 1.0 / (2.0 * math.pi * cutoff_hz * dt_s))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from handsteer.config import JoystickConfig
 from handsteer.recognition.features import KNUCKLES, PALM, WRIST
+from handsteer.recognition.filters import OneEuro
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import Recognition
 from handsteer.types import GO, RELEASED, STOP, Handedness, Stick
@@ -69,9 +70,6 @@ _RESIZE: Final = 1.6
 
 _RANGE: Final = (255, 255, 255)
 _STICK: Final = (90, 200, 90)
-
-_SPEED_HZ: Final = 1.0
-"""Cutoff frequency for the speed in the One-Euro filter, as its authors have it."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +195,7 @@ class HandJoystick:
         )
         self.grip = Grip(seen.handedness, (x, y), palm_px, (x, y))
         self.stick = Stick(True)
-        self._filter = _OneEuro(np.zeros(2))
+        self._filter = OneEuro(np.zeros(2))
         self._unclear_s = self._other_s = 0.0
         self._since_open_s = math.inf
 
@@ -223,11 +221,18 @@ class HandJoystick:
 def deflection(moved: float, config: JoystickConfig) -> float:
     """Return the deflection, -1 to 1, of a hand that ``moved`` so many palm lengths along an axis.
 
-    Beyond the dead zone it rises to 1 at full deflection as ``(1 - expo) u + expo u**3``, the "expo" of radio controls.
+    It is :func:`response` with the dead zone and the full deflection of ``config``.
     """
-    room = config.full_deflection - config.dead_zone
-    share = min(1.0, max(0.0, abs(moved) - config.dead_zone) / room)
-    return math.copysign((1.0 - config.expo) * share + config.expo * share**3, moved) if share else 0.0
+    return response(moved, config.dead_zone, config.full_deflection, config.expo)
+
+
+def response(value: float, dead_zone: float, full: float, expo: float) -> float:
+    """Return the deflection, -1 to 1, for ``value``: 0 within the dead zone, 1 from ``full`` on.
+
+    Between them it rises as ``(1 - expo) u + expo u**3``, the "expo" of radio controls.
+    """
+    share = min(1.0, max(0.0, abs(value) - dead_zone) / (full - dead_zone))
+    return math.copysign((1.0 - expo) * share + expo * share**3, value) if share else 0.0
 
 
 @dataclass(frozen=True)
@@ -265,27 +270,3 @@ class _Seen:
         ratio = self.palm_px / last.palm_px
         is_near = off <= (_TREMOR + min(_CHANGE, _ACCELERATION * dt_s**2)) * max(self.palm_px, last.palm_px)
         return is_near and 1 / _RESIZE_A_FRAME <= ratio <= _RESIZE_A_FRAME
-
-
-class _OneEuro:
-    """The One-Euro filter: a low-pass whose cutoff rises with speed (Casiez, Roussel and Vogel, CHI 2012)."""
-
-    def __init__(self, value: NDArray[np.float64]) -> None:
-        self._value = value
-        self._raw = value
-        self._speed = np.zeros_like(value)
-
-    def step(self, raw: NDArray[np.float64], dt_s: float, min_cutoff_hz: float, beta: float) -> NDArray[np.float64]:
-        if dt_s <= 0:
-            return self._value
-        speed = (raw - self._raw) / dt_s
-        self._raw = raw
-        self._speed = self._speed + _share(_SPEED_HZ, dt_s) * (speed - self._speed)
-        share = _share(min_cutoff_hz + beta * float(np.linalg.norm(self._speed)), dt_s)
-        self._value = self._value + share * (raw - self._value)
-        return self._value
-
-
-def _share(cutoff_hz: float, dt_s: float) -> float:
-    """Return the weight of a new value in a first-order low-pass."""
-    return 1.0 / (1.0 + 1.0 / (2.0 * math.pi * cutoff_hz * dt_s))

@@ -261,16 +261,16 @@ class Recognizer:
         return guess if guess.confidence >= min(least, self._config.min_confidence) else _NOTHING
 
 
-def annotate(image: NDArray[np.uint8], recognition: Recognition) -> NDArray[np.uint8]:
+def annotate(image: NDArray[np.uint8], recognition: Recognition, *, names_sign: bool = True) -> NDArray[np.uint8]:
     """Return a mirrored copy of ``image``, (height, width, 3) uint8, BGR, that shows what was recognised.
 
-    It has the hand's skeleton, the palm's direction, the sign, and a ring around the palm that fills while the sign is
-    confirmed.
+    It has the hand's skeleton, the palm's direction, with ``names_sign`` the name of the sign, and a ring around the
+    palm that fills while the sign is confirmed.
     """
     picture = draw_hand(image, recognition.hand)
     if recognition.hand is not None:
         _draw_palm(picture, recognition.hand, recognition)
-    if recognition.seen != NONE:
+    if names_sign and recognition.seen != NONE:
         _draw_label(picture, recognition)
     return picture
 

@@ -7,9 +7,9 @@ from typing import Any, Literal
 
 from pydantic import ValidationError
 
-from handsteer.errors import WorldError
+from handsteer.errors import WorldError, quoted
 from handsteer.robots import Shape
-from handsteer.robots.world import Box, Cylinder, Gate, Sphere, Thing, World, describe_problem
+from handsteer.robots.world import LONGEST_NAME, Box, Cylinder, Gate, Sphere, Thing, World, describe_problem
 from handsteer.types import Pose2D
 
 Change = Callable[[World], World]
@@ -32,6 +32,20 @@ _WALL_WIDTH_M, _WALL_HEIGHT_M = 0.1, 0.5
 _ROBOT_RADIUS_M = 0.4
 _GAP_M = 0.1
 _RING_M = 0.5
+
+
+def rename(world: World, name: str) -> World:
+    """Return ``world`` under another name.
+
+    Raises:
+        WorldError: The name is empty, too long, or not printable.
+    """
+    name = " ".join(name.split())
+    if not 0 < len(name) <= LONGEST_NAME or not name.isprintable():
+        raise WorldError(
+            f"{quoted(name)} is not a valid name for a world: give 1 to {LONGEST_NAME} printable characters"
+        )
+    return world.model_copy(update={"name": name})
 
 
 def add(world: World, shape: Shape, robot: Pose2D) -> World:

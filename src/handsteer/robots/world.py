@@ -28,6 +28,8 @@ from handsteer.robots import Shape
 _SHIPPED = Path(__file__).parent / "worlds"
 
 _NARROWEST_GATE_M = 0.1
+LONGEST_NAME = 60
+"""Maximum number of characters of a world's name."""
 
 Metres = Annotated[float, Field(ge=0.005, le=100)]
 Coordinate = Annotated[float, Field(ge=-1000, le=1000)]
@@ -126,6 +128,7 @@ class World(Section):
     ``path`` and ``stop`` describe how a course is meant to be driven, for :mod:`handsteer.plugins.bench`.
     """
 
+    name: str = Field("", max_length=LONGEST_NAME, description="What it is called; by default as its file")
     floor: Floor = Floor()
     obstacles: tuple[Thing, ...] = ()
     gates: tuple[Gate, ...] = Field((), max_length=100)
@@ -174,7 +177,13 @@ def read_world(path: Path) -> World:
     Raises:
         WorldError: As :func:`load_world`.
     """
-    return _world(plain_yaml.read(path, str(path), WorldError, f"cannot read the world {path}"), str(path))
+    values = plain_yaml.read(path, str(path), WorldError, f"cannot read the world {path}")
+    return named_by_file(_world(values, str(path)), path)
+
+
+def named_by_file(world: World, path: Path) -> World:
+    """Return ``world``, which was in the file ``path``, under the file's name if it has none of its own."""
+    return world if world.name else world.model_copy(update={"name": path.stem[:LONGEST_NAME]})
 
 
 def parse_world(text: str, source: str) -> World:
@@ -200,7 +209,8 @@ def _world(values: Any, source: str) -> World:
 def write_world(world: World) -> str:
     """Return ``world`` as YAML, one line per thing, for :func:`parse_world`."""
     parts = world.model_dump(exclude_defaults=True)
-    lines = [f"floor: {_one_line(world.floor.model_dump())}"]
+    lines = [_one_line({"name": world.name})[1:-1]] if world.name else []
+    lines += [f"floor: {_one_line(world.floor.model_dump())}"]
     for section in ("obstacles", "gates"):
         if things := parts.get(section):
             lines += [f"{section}:", *(f"  - {_one_line(thing)}" for thing in things)]

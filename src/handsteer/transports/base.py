@@ -144,6 +144,16 @@ class KnowsTypes(Protocol):
         ...
 
 
+class Managed(Protocol):
+    """A node that a graph with managed nodes activates and deactivates."""
+
+    is_active: bool
+
+    def set_active(self, is_active: bool) -> bool:
+        """Activate or deactivate it, before this returns; return whether that has happened."""
+        ...
+
+
 class Session(ABC):
     """A process's membership in a graph of several processes.
 
@@ -162,7 +172,10 @@ class Session(ABC):
     def serve(self, parameters: NodeParameters) -> None:  # noqa: B027 - ROS 1 does not
         """Let others get and set the parameters of this process's node, if the graph supports it."""
 
-    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:  # noqa: B027 - only rclpy does
+    def manage(self, node: Managed) -> None:  # noqa: B027 - only rclpy does
+        """Let others activate and deactivate this process's node, which has not started, if the graph supports it."""
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:  # noqa: B027 - only ROS's own libraries do
         """Offer the services ``~/name`` of this process's node, if the graph supports it.
 
         Args:

@@ -2,19 +2,22 @@
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
 
 from handsteer.config import Config, ControlConfig, JoystickConfig
-from handsteer.control.sign_control import CruiseControl, SignControl
+from handsteer.control.pointing import IN_A_CURVE
+from handsteer.control.sign_control import SignControl
 from handsteer.plugins.bench.hand_view import HandView
 from handsteer.plugins.bench.hands import OperatorsHand, Slips
 from handsteer.plugins.bench.interfaces import REFRACTORY_S, TICK_S
 from handsteer.plugins.bench.operator import DECISION_S, Skill
 from handsteer.plugins.virtual_hand.kinematics import BONE_LENGTHS_M
+from handsteer.plugins.virtual_hand.poses import sign_pose
 from handsteer.recognition.hand_joystick import deflection
+from handsteer.recognition.pointing import SLOWEST, height_deflection, tilt_deflection
 from handsteer.types import BACKWARD, FORWARD, GO, NONE, STOP, TURN_LEFT, TURN_RIGHT, ZERO, Velocity
 
 HAND_S = 0.06
@@ -26,6 +29,10 @@ _STEP_S, _STEPS = 0.1, 10
 _DURATIONS = (1, 3, _STEPS)
 _PATIENCE_S = 0.3
 _LINEAR_MPS, _ANGULAR_RADPS = 0.15, 0.5
+
+_LOOKS_S, _LEARNS, _TRIM_RAD = 0.4, 0.1, 0.2
+_TURNS_MPS, _ENDS_MPS = 0.05, 0.13
+_FRAME_M = 0.46
 
 _OPEN_S = 0.45
 PALM_M = float(BONE_LENGTHS_M[[4, 8, 12, 16]].mean())
@@ -55,12 +62,16 @@ class SignChoice:
                     "angular_acceleration": config.angular_step * fps,
                 }
             )
-        self._rule = CruiseControl(config) if config.rule == "cruise" else SignControl(config)
+        self._rule = SignControl(config)
         self._reluctance = reluctance
 
     def note(self, sign: str, dt_s: float) -> None:
         """Take the sign that counted in the last ``dt_s`` seconds, so that the effect of the next ones is known."""
         self._rule.step(sign, dt_s)
+
+    def hold_back(self, velocity: Velocity) -> None:
+        """Take the velocity that the robot got instead."""
+        self._rule.hold_back(velocity)
 
     def best(self, shown: str, wanted: Velocity) -> str:
         """Return the sign to show.
@@ -127,6 +138,10 @@ class ByHand:
         self.hand = OperatorsHand(random, slips, CHOICES)
         self._view = view
 
+    def hold_back(self, velocity: Velocity) -> None:
+        """Continue from ``velocity``."""
+        self._view.teleop.hold_back(velocity)
+
 
 class Signs(ByHand):
     """Hand signs with one of the control's rules.
@@ -168,6 +183,11 @@ class Signs(ByHand):
         if velocity is not None:
             self._choice.note(self._view.sign, self._view.since_s)
         return velocity
+
+    def hold_back(self, velocity: Velocity) -> None:
+        """Continue from ``velocity``, as the operator sees."""
+        super().hold_back(velocity)
+        self._choice.hold_back(velocity)
 
 
 class Joystick(ByHand):
@@ -229,12 +249,111 @@ class Joystick(ByHand):
         self._was_held = False
 
 
+class Point(ByHand):
+    """The index finger points where to go (``control.rule: point``); arguments as for :class:`Signs`.
+
+    The top speed is set once, to the operator's pace, as with the pad.
+    """
+
+    def __init__(self, config: Config, skill: Skill, view: HandView, slips: Slips, random: np.random.Generator) -> None:
+        super().__init__(view, slips, random)
+        self._control, self._sticks = config.control, config.joystick
+        self._least = 0.1 * skill.reluctance
+        self._now, self._fast = ZERO, 0.0
+        self._before_mps = 0.0
+        self._aim = self._trim_rad = 0.0
+        self._since_s = self._shown_s = math.inf
+        self._moves = 0
+
+    @property
+    def changes(self) -> int:
+        """How often the sign, or the aim of the finger, has changed."""
+        return self.hand.changes + self._moves
+
+    def want(self, wanted: Velocity) -> None:
+        """Point along the arc, if the change is worth it."""
+        self._since_s += DECISION_S
+        self._shown_s += DECISION_S
+        sign = self._sign_for(wanted)
+        if sign != self.hand.intended and (self._shown_s >= _PATIENCE_S or sign == STOP):
+            self.hand.show(sign)
+            self._shown_s, self._fast = 0.0, math.inf
+        self._learn()
+        if self.hand.intended not in (FORWARD, BACKWARD) or sign != self.hand.intended:
+            self._aim = 0.0
+            self.hand.turn(0.0)
+            return
+        share = self._share_for(wanted)
+        full = self._control.max_linear * (1.0 - IN_A_CURVE * abs(share))
+        fast = min(1.0, max(SLOWEST, abs(wanted.linear_mps) / full))
+        is_small = math.dist((share, fast), (self._aim, self._fast)) < self._least
+        if is_small or self._since_s < REFRACTORY_S - 1e-9:
+            return
+        self._aim, self._fast, self._since_s = share, fast, 0.0
+        self._moves += 1
+        # The finger's left is the image's right, and clockwise turns it there from up, and away from it from down.
+        self.hand.turn(math.radians(tilt_for(share, self._sticks)) + self._trim_rad)
+        sticks = self._sticks
+        y = height_for(fast, sticks)
+        self.hand.reach(np.array([0.0, (y - 0.5) * _FRAME_M - sign_pose(sign).view.position[1]]))
+
+    def _learn(self) -> None:
+        """Correct the finger by the arc that the page draws: its direction differs from the hand's by some degrees."""
+        stick = self._view.teleop.stick
+        if not (stick.forward and stick.left) or self._since_s < _LOOKS_S or self._shown_s < 2 * _LOOKS_S:
+            return
+        shown = tilt_for(stick.left, self._sticks)
+        off = tilt_for(self._aim, self._sticks) - shown
+        self._trim_rad = max(-_TRIM_RAD, min(self._trim_rad + _LEARNS * math.radians(off), _TRIM_RAD))
+
+    def step(self) -> Velocity | None:
+        """Advance time by one tick; return the command of a new frame."""
+        self.hand.step(TICK_S)
+        velocity = self._view.step(self.hand)
+        if velocity is not None:
+            self._now = velocity
+        return velocity
+
+    def _sign_for(self, wanted: Velocity) -> str:
+        """Return the sign after which the robot's speed is soon nearest to what is wanted."""
+        linear, angular = wanted.linear_mps, wanted.angular_radps
+        if wanted.is_zero:
+            return STOP
+        if abs(linear) < _TURNS_MPS:
+            return TURN_LEFT if angular > 0.0 else TURN_RIGHT if angular < 0.0 else STOP
+        way, now = (FORWARD if linear > 0.0 else BACKWARD), self._now.linear_mps
+        slows, self._before_mps = abs(linear) < abs(self._before_mps), linear
+        is_ending = slows and abs(linear) < _ENDS_MPS and way == self.hand.intended
+        return STOP if now * linear < 0.0 or is_ending else way
+
+    def _share_for(self, wanted: Velocity) -> float:
+        """Return the deflection to the left for the arc of ``wanted``, -1 to 1, as the finger is tilted."""
+        fastest = self._control.max_linear
+        arc = wanted.angular_radps / max(abs(wanted.linear_mps), 1e-6) * fastest / self._control.point_turn
+        share = arc / (1.0 + IN_A_CURVE * abs(arc))
+        return max(-1.0, min(1.0, share))
+
+
+def height_for(share: float, config: JoystickConfig) -> float:
+    """Return the height of the palm, 0 (top) to 1 of the picture, whose deflection is ``share``, above 0 to 1."""
+    return _found(lambda y: height_deflection(y, config), config.slow_at, config.fast_at, share)
+
+
+def tilt_for(share: float, config: JoystickConfig) -> float:
+    """Return the tilt in degrees whose deflection is ``share``, -1 to 1."""
+    tilt = _found(lambda deg: tilt_deflection(deg, config), config.tilt_dead_zone, config.full_tilt, abs(share))
+    return math.copysign(tilt, share) if share else 0.0
+
+
 def moved_for(share: float, config: JoystickConfig) -> float:
     """Return the movement, in palm lengths, whose deflection is ``share``, -1 to 1."""
-    low, high = config.dead_zone, config.full_deflection
-    if share == 0.0:
-        return 0.0
+    moved = _found(lambda way: deflection(way, config), config.dead_zone, config.full_deflection, abs(share))
+    return math.copysign(moved, share) if share else 0.0
+
+
+def _found(deflection_of: Callable[[float], float], least: float, most: float, share: float) -> float:
+    """Return the value between those of the least and the most deflection at which it is ``share``, by bisection."""
     for _ in range(20):
-        middle = (low + high) / 2
-        low, high = (middle, high) if deflection(middle, config) < abs(share) else (low, middle)
-    return math.copysign(high, share)
+        middle = (least + most) / 2
+        least, most = (middle, most) if deflection_of(middle) < share else (least, middle)
+    return most

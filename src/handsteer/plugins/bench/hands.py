@@ -117,6 +117,7 @@ class OperatorsHand:
         self.intended = NONE
         self.changes = 0
         self._wrist: Limb | None = None
+        self._turned: Limb | None = None
         self._from = self._to = numbers_of(sign_pose(NONE))
         self._share, self._change_s = 1.0, 1.0
         self._notice_s = math.inf
@@ -147,6 +148,11 @@ class OperatorsHand:
         self._wrist = self._wrist or Limb(2, _ARM_S, self._random)
         self._wrist.aim(offset_m)
 
+    def turn(self, roll_rad: float) -> None:
+        """Tilt the hand in the picture by ``roll_rad``, clockwise as the camera sees it."""
+        self._turned = self._turned or Limb(1, _ARM_S, self._random)
+        self._turned.aim(np.array([roll_rad]))
+
     def step(self, dt_s: float) -> None:
         """Advance time by ``dt_s`` seconds."""
         self._time_s += dt_s
@@ -157,6 +163,8 @@ class OperatorsHand:
             self._move_to(numbers_of(sign_pose(self.intended)))
         if self._wrist is not None:
             self._wrist.step(dt_s)
+        if self._turned is not None:
+            self._turned.step(dt_s)
 
     def _move_to(self, numbers: Array) -> None:
         self._from, self._to = self._now(), numbers
@@ -174,4 +182,6 @@ class OperatorsHand:
         numbers[-3:] += math.sqrt(2.0) * _TREMOR_M * np.sin(math.tau * self._time_s * hertz + phases)
         if self._wrist is not None:
             numbers[-3:-1] += self._wrist.place()
+        if self._turned is not None:
+            numbers[-4] += self._turned.place()[0]
         return pose_of(numbers)

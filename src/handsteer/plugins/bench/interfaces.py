@@ -55,6 +55,10 @@ class Interface(Protocol):
         """Advance time by :data:`TICK_S`; return the velocity that is commanded now, None if there is no new one."""
         ...
 
+    def hold_back(self, velocity: Velocity) -> None:
+        """Continue from ``velocity``, which an assist lets through."""
+        ...
+
 
 class _Page:
     """Sends a velocity at the page's rate while in use, and lets the control process it; see :class:`Interface`."""
@@ -82,6 +86,10 @@ class _Page:
             return self._control.step(TICK_S, steering=velocity)
         return self._control.step(TICK_S)
 
+    def hold_back(self, velocity: Velocity) -> None:
+        """Continue from ``velocity``."""
+        self._control.mux.hold_back(velocity)
+
     def _move(self) -> Velocity | None:
         """Advance the hand by one tick; return the velocity it holds, None if it holds none."""
         raise NotImplementedError
@@ -94,7 +102,7 @@ class Pad(_Page):
 
     def __init__(self, config: ControlConfig, skill: Skill, random: np.random.Generator) -> None:
         super().__init__(config)
-        self._top_mps = _top(skill)
+        self._top_mps = top_speed(skill)
         self._least = 0.1 * skill.reluctance
         self._thumb = Limb(2, self.movement_s, random)
         self._aim = np.zeros(2)
@@ -140,7 +148,7 @@ class Keys(_Page):
 
     def __init__(self, config: ControlConfig, skill: Skill, random: np.random.Generator) -> None:
         super().__init__(config)
-        self._top_mps = _top(skill)
+        self._top_mps = top_speed(skill)
         self._random = random
         self._owed = [0.0, 0.0]
         self._least = (0.12 * skill.reluctance, 0.3 * skill.reluctance)
@@ -234,6 +242,6 @@ class Sliders(_Page):
         return Velocity(*self._values) if any(self._values) else None
 
 
-def _top(skill: Skill) -> float:
+def top_speed(skill: Skill) -> float:
     """Return the top speed to set on the page, in its steps of 0.1 m/s."""
     return min(_FASTEST_TOP_MPS, max(_SLOWEST_TOP_MPS, math.ceil(10 * skill.pace_mps - 1e-9) / 10))

@@ -9,11 +9,12 @@ import numpy as np
 
 from handsteer.config import Config, RobotConfig
 from handsteer.errors import BenchError
+from handsteer.plugins.bench.assisting import ASSISTS, Assistance
 from handsteer.plugins.bench.courses import Course, off_stop, open_course
-from handsteer.plugins.bench.hand_interfaces import Joystick, Signs
+from handsteer.plugins.bench.hand_interfaces import Joystick, Point, Signs
 from handsteer.plugins.bench.hand_view import HandView, LandmarkErrors, Through
 from handsteer.plugins.bench.hands import Slips
-from handsteer.plugins.bench.interfaces import TICK_S, Gamepad, Interface, Keys, Pad, Sliders
+from handsteer.plugins.bench.interfaces import TICK_S, Gamepad, Interface, Keys, Pad, Sliders, top_speed
 from handsteer.plugins.bench.operator import DECISION_S, REACTION_S, Operator, Seen, Skill, adapted
 from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.robots import RobotState
@@ -48,6 +49,7 @@ class Conditions:
         errors: Factor on errors of landmarks and on the operator's slips.
         reaction_s: The operator's reaction time.
         through: How the hand is seen.
+        assist: Whether the control brakes or steers before obstacles.
     """
 
     latency_s: float = 0.0
@@ -55,6 +57,7 @@ class Conditions:
     errors: float = 1.0
     reaction_s: float = REACTION_S
     through: Through = "landmarks"
+    assist: str = "off"
 
     def __post_init__(self) -> None:
         for name, what, unit, low, high in _LIMITS:
@@ -63,6 +66,8 @@ class Conditions:
                 raise BenchError(f"{what}: {value:g} should be from {low:g} to {high:g}")
         if self.through not in get_args(Through):
             raise BenchError(f"through: {self.through!r} should be landmarks or pictures")
+        if self.assist not in ASSISTS:
+            raise BenchError(f"assist: {self.assist!r} should be {', '.join(ASSISTS)}")
 
 
 @dataclass(frozen=True)
@@ -122,8 +127,8 @@ _SIGNS = Skill(0.581, 1.121, 0.818, 1.942, 0.166)
 KINDS: dict[str, _Kind] = {
     "signs": _Kind(_SIGNS),
     "signs_per_second": _Kind(_SIGNS, {"ramp": "per_second"}),
-    "cruise": _Kind(Skill(0.448, 1.372, 0.889, 2.094, 0.78), {"rule": "cruise"}),
     "joystick": _Kind(Skill(1.0, 1.374, 0.619, 1.907, 1.621), {"mode": "joystick"}, Joystick),
+    "point": _Kind(Skill(1.0, 1.5, 0.5, 1.9, 1.5), {"rule": "point"}, Point),
     "pad": _Kind(Skill(0.944, 1.526, 0.491, 1.939, 1.658), make=Pad, by_hand=False),
     "keys": _Kind(Skill(0.846, 1.027, 0.289, 1.735, 1.189), make=Keys, by_hand=False),
     "sliders": _Kind(Skill(0.261, 0.752, 0.755, 1.409, 1.118), make=Sliders, by_hand=False),
@@ -168,7 +173,8 @@ def run_lap(
     skill = skill or KINDS[interface].skill
     if adapts:
         skill = adapted(skill, conditions.latency_s + conditions.reaction_s - REACTION_S)
-    lap = _Run(course, conditions, seed, _opened(interface, conditions, skill, seed, config or Config()), skill)
+    config = config or Config()
+    lap = _Run(course, conditions, seed, _opened(interface, conditions, skill, seed, config), skill, config=config)
     return lap.run(trace)
 
 
@@ -178,6 +184,8 @@ def _opened(name: str, conditions: Conditions, skill: Skill, seed: int, config: 
     random = np.random.default_rng([seed, 1])
     if not kind.by_hand:
         return kind.make(control, skill, random)
+    if name == "point":
+        control = control.model_copy(update={"max_linear": top_speed(skill)})
     camera = config.camera.model_copy(update={"fps": conditions.fps})
     config = config.model_copy(update={"control": control, "camera": camera})
     view = HandView(config, conditions.through, LandmarkErrors().scaled(conditions.errors), seed)
@@ -189,9 +197,12 @@ def _opened(name: str, conditions: Conditions, skill: Skill, seed: int, config: 
 class _Run:
     """A lap in progress."""
 
-    def __init__(self, course: Course, conditions: Conditions, seed: int, interface: Interface, skill: Skill) -> None:
+    def __init__(
+        self, course: Course, conditions: Conditions, seed: int, interface: Interface, skill: Skill, *, config: Config
+    ) -> None:
         self._course, self._interface, self._seed = course, interface, seed
         self._robot = SimulatedRobot(RobotConfig(), course.world)
+        self._assistance = Assistance(conditions.assist, config, self._robot)
         self._referee = Referee(course.gates)
         half_s = conditions.latency_s / 2
         random = np.random.default_rng([seed, 0])
@@ -208,8 +219,9 @@ class _Run:
             if self._tick % _DECISION_TICKS == 0:
                 seen = Seen(state.truth, Velocity(state.linear_mps, state.angular_radps), bool(state.contacts))
                 self._interface.want(self._operator.decide(seen))
-            self._send(self._interface.step())
+            self._send(self._interface.step(), state.time_s)
             state = self._robot.step(TICK_S)
+            self._assistance.note(state)
             self._tick += 1
             course = self._referee.step(state.truth, state.collisions or 0, state.time_s)
             self._measures.note(course, state, self._interface.changes)
@@ -217,11 +229,14 @@ class _Run:
                 trace.append(state.truth)
         return self._measures.lap(self._seed, course)
 
-    def _send(self, command: Velocity | None) -> None:
+    def _send(self, command: Velocity | None, now_s: float) -> None:
         if command is not None:
             self._on_the_way.append((self._tick + self._delay_ticks, command))
         while self._on_the_way and self._on_the_way[0][0] <= self._tick:
-            _, command = self._on_the_way.popleft()
+            _, wanted = self._on_the_way.popleft()
+            command, goes_on = self._assistance.admit(wanted, now_s)
+            if goes_on is not None:
+                self._interface.hold_back(goes_on)
             self._robot.command(command.linear_mps, command.angular_radps)
 
 

@@ -53,7 +53,8 @@ def write_plots(
 def draw_times(results: Sequence[CellResult], course: Course) -> Figure:
     """Return a plot of the time of each lap through each interface, as dots, and the median with its interval."""
     figure = Figure((7, 0.5 * len(results) + 1.6), layout="constrained")
-    title = f"{Path(course.name).stem}: {course.length_m:.1f} m, index of difficulty {course.difficulty:.1f}"
+    size = f"{course.length_m:.1f} m, index of difficulty {course.difficulty:.1f}"
+    title = f"{Path(course.name).stem}: times of all laps ({size})"
     axes = figure.add_subplot(title=title, xlabel="time, s; a line for the median and its 95 % interval")
     axes.set_yticks(range(len(results)), [result.cell.interface for result in results])
     axes.invert_yaxis()
@@ -72,7 +73,8 @@ def draw_times(results: Sequence[CellResult], course: Course) -> Figure:
 def draw_laps(results: Sequence[CellResult], course: Course) -> Figure:
     """Return a map of ``course`` with the ideal path in grey, and the lap of the first seed through each interface."""
     figure = Figure((8, 6), layout="constrained")
-    axes = figure.add_subplot(aspect="equal", xlabel="x, m", ylabel="y, m")
+    title = f"{Path(course.name).stem}: one lap through each interface, and the ideal path in grey"
+    axes = figure.add_subplot(aspect="equal", title=title, xlabel="x, m", ylabel="y, m")
     for thing in course.world.obstacles:
         axes.add_patch(_outline(thing))
     axes.plot(*course.path.points.T, color=_GREY, linewidth=6)
@@ -90,7 +92,8 @@ def draw_laps(results: Sequence[CellResult], course: Course) -> Figure:
 def draw_sweep(results: Sequence[CellResult], factor: str, course: str) -> Figure:
     """Return a plot of the median time, with its 95 % interval, by ``factor``: a line for each interface."""
     figure = Figure((7, 5), layout="constrained")
-    axes = figure.add_subplot(title=course, xlabel=_UNITS.get(factor, factor), ylabel="time, s")
+    title = f"{course}: times by {_UNITS.get(factor, factor)}"
+    axes = figure.add_subplot(title=title, xlabel=_UNITS.get(factor, factor), ylabel="time, s")
     name, unit = FACTORS[factor]
     for number, interface in enumerate(dict.fromkeys(result.cell.interface for result in results)):
         own = [result for result in results if result.cell.interface == interface]

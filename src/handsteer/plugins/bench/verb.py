@@ -2,10 +2,10 @@
 
 import json as json_format
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from cyclopts import Parameter
 
@@ -20,10 +20,25 @@ if TYPE_CHECKING:
 
 Words = Annotated[list[str] | None, Parameter(negative="")]
 
-_HEAD = (
-    *("course", "interface", "conditions", "laps", "time s", "timed out", "missed", "bumps"),
-    *("path", "off cm", "over cm", "acts/min", "stands"),
-)
+_HEAD = ("interface", "conditions", "time", "late", "miss", "bumps", "path", "off", "over", "acts", "rest")
+_WORDS = """\
+time   median in seconds, with its 95 % interval; no lap counts with more than three minutes
+late   laps that took longer than that
+miss   gates missed a lap, mean
+bumps  into obstacles a lap, mean
+path   median length of the way driven, divided by that of the ideal path
+off    median distance from the ideal path, root mean square of a lap, in cm
+over   median of how far it came beyond the place to stop at, in cm
+acts   median of what the operator changes a minute: a sign, a key, the aim of a fist or thumb
+rest   median share of the time at rest, in percent
+
+A simulated operator drove, no person. Intervals of all figures: --json."""
+
+_RARE: Final = ("conditions", "late", "over")
+_COURSE: Final = "slalom"
+_SEEDS: Final = 5
+_ALL_SEEDS: Final = 20
+_BAR: Final = "{percentage:3.0f} % {bar} {n_fmt} of {total_fmt} laps, {remaining} left"
 
 
 @Parameter(name="*")
@@ -42,12 +57,15 @@ class Varied:
     sweep
         Vary one condition, such as latency=0,250,500,750 (ms), fps=10,15,30,60, errors=0,1,2,4 (factor on the errors
         of landmarks and operator) or reaction=150,250,400 (ms); may be repeated.
+    assist
+        off, brake or steer, as control.assist; may be repeated. By default control.assist.
     """
 
     through: Literal["landmarks", "pictures"] = "landmarks"
     latency: float = 0.0
     fps: float = 30.0
     sweep: Words = None
+    assist: Words = None
 
     def sweeps(self) -> "list[tuple[str, list[float]]]":
         """Return each condition that is varied, with its values."""
@@ -55,13 +73,14 @@ class Varied:
 
         return [parse_sweep(text) for text in self.sweep or ()]
 
-    def conditions(self) -> "list[Conditions]":
-        """Return all conditions to drive under."""
+    def conditions(self, assist: str) -> "list[Conditions]":
+        """Return all conditions to drive under; ``assist`` where none is named."""
         from handsteer.plugins.bench.cells import with_factor
         from handsteer.plugins.bench.laps import Conditions
 
-        base = Conditions(latency_s=self.latency / 1000, fps=self.fps, through=self.through)
-        return [with_factor(base, factor, value) for factor, values in self.sweeps() for value in values] or [base]
+        usual = Conditions(latency_s=self.latency / 1000, fps=self.fps, through=self.through)
+        varied = [with_factor(usual, factor, value) for factor, values in self.sweeps() for value in values] or [usual]
+        return [replace(each, assist=kind) for each in varied for kind in self.assist or [assist]]
 
 
 @loads("handsteer.config", "rich.table", "tqdm")
@@ -69,7 +88,8 @@ def bench(
     *,
     course: Words = None,
     interface: Words = None,
-    seeds: int = 20,
+    all: bool = False,
+    seeds: int | None = None,
     first_seed: int = 0,
     varied: Varied = Varied(),
     jobs: int | None = None,
@@ -81,22 +101,22 @@ def bench(
     """Measure laps that a simulated operator drives through interfaces. Simulated laps are not a user study.
 
     For example:
-      handsteer bench --course slalom --seeds 5  all interfaces
+      handsteer bench        five laps of the slalom through each interface: a minute or two
+      handsteer bench --all  twenty laps of each of five courses: up to an hour
       handsteer bench --course maze --interface signs --interface pad
-      handsteer bench --course slalom --sweep latency=0,250,500
-
-    The table has medians with their 95 % intervals, and means of missed gates and bumps a lap.
-    Laps that take longer than three minutes count with three minutes.
+      handsteer bench --sweep latency=0,250,500
 
     Parameters
     ----------
     course
         Course to drive: slalom, figure-eight, stop-line, parking, maze, doors, roundabout, warehouse, or a world file
-        with gates; may be repeated. By default, the first five are driven.
+        with gates; may be repeated. By default the slalom; with --all the first five.
     interface
-        signs, signs_per_second, cruise, joystick, pad, keys, sliders or gamepad; may be repeated. All by default.
+        signs, signs_per_second, joystick, point, pad, keys, sliders or gamepad; may be repeated. All by default.
+    all
+        Drive more courses, and more laps.
     seeds
-        Number of laps of each cell.
+        Number of laps on each course through each interface: 5 by default, 20 with --all.
     first_seed
         Seed of the first lap; the same seeds give the same laps.
     jobs
@@ -108,14 +128,21 @@ def bench(
     config_file
         YAML file with parameters of handsteer, such as control.rule; options override it.
     """
-    _check(seeds, first_seed, jobs)
+    laps = seeds if seeds is not None else _ALL_SEEDS if all else _SEEDS
+    _check(laps, first_seed, jobs)
     with needing("the simulated robot", "sim", "mujoco", "xacro"):
         from handsteer.plugins.bench.laps import INTERFACES
     if json is not None:
         check_writable("--json", json, BenchError)
     drawing = _open_plots(plots)
-    cells = _cells(course, interface or list(INTERFACES), varied)
-    results = _drive(cells, range(first_seed, first_seed + seeds), jobs, settings(config_file, parameters))
+    from handsteer.config import assist_of
+    from handsteer.plugins.bench.courses import COURSES
+
+    courses = course or (list(COURSES) if all else [_COURSE])
+    config = settings(config_file, parameters)
+    conditions = varied.conditions(assist_of(config.control, config.collision_monitor))
+    cells = _cells(courses, interface or list(INTERFACES), conditions)
+    results = _drive(cells, range(first_seed, first_seed + laps), jobs, config)
     print(bench_table(results))
     if json is not None:
         _write(json, json_format.dumps([result.as_dict() for result in results], indent=1))
@@ -132,53 +159,63 @@ def _check(seeds: int, first_seed: int, jobs: int | None) -> None:
         raise BenchError(f"--jobs: {jobs} should be at least 1")
 
 
-def _cells(courses: list[str] | None, interfaces: list[str], varied: Varied) -> "list[Cell]":
+def _cells(courses: list[str], interfaces: list[str], conditions: "list[Conditions]") -> "list[Cell]":
     from handsteer.plugins.bench.cells import Cell
-    from handsteer.plugins.bench.courses import COURSES
 
-    conditions = varied.conditions()
-    return [
-        Cell(course, interface, each)
-        for course in courses or COURSES
-        for interface in interfaces
-        for each in conditions
-    ]
+    return [Cell(course, interface, each) for course in courses for interface in interfaces for each in conditions]
 
 
 def _drive(cells: "list[Cell]", seeds: range, jobs: int | None, config: "Config") -> "list[CellResult]":
-    """Drive all laps, with a progress bar."""
+    """Drive all laps, with a progress bar on a terminal."""
     from tqdm import tqdm
 
     from handsteer.plugins.bench.cells import run_cells
 
-    with tqdm(total=len(dict.fromkeys(cells)) * len(seeds), unit="lap", disable=None) as bar:
+    with tqdm(total=len(dict.fromkeys(cells)) * len(seeds), bar_format=_BAR, disable=None) as bar:
         return run_cells(cells, seeds, jobs=jobs or os.cpu_count() or 1, config=config, progress=bar.update)
 
 
 def bench_table(results: "list[CellResult]") -> str:
-    """Return the results as a table, a row for each cell."""
-    return table(_HEAD, [_row(result) for result in results], text_columns=3)
+    """Return the results as a table for each course, a row for each cell, and what the words mean."""
+    parts = []
+    for course in dict.fromkeys(result.cell.course for result in results):
+        rows = [_row(result) for result in results if result.cell.course == course]
+        # Columns in which there is nothing are left out.
+        shown = [at for at, name in enumerate(_HEAD) if name not in _RARE or any(row[at] not in "-." for row in rows)]
+        cells = table(
+            [_HEAD[at] for at in shown], [[row[at] for at in shown] for row in rows], text_columns=1 + (1 in shown)
+        )
+        parts.append(f"{course}, {len(results[0].laps)} laps each\n\n{cells}")
+    return "\n\n".join([*parts, _WORDS])
 
 
 def _row(result: "CellResult") -> list[str]:
     cell = result.cell
     return [
-        *(cell.course, cell.interface, _conditions(cell), str(len(result.laps))),
-        _number(result.median("time_s"), 1),
+        *(cell.interface, _conditions(cell), _interval(result.median("time_s"))),
         *(str(result.timed_out or "."), _number(result.mean("missed"), 2), _number(result.mean("bumps"), 2)),
         _number(result.median("path_ratio"), 2),
         _number(result.median("cross_track_m"), 1, 100),
         _number(result.median("overshoot_m"), 1, 100),
         _number(result.median("commands_per_min"), 0),
-        _number(result.median("standing"), 0, 100) + " %",
+        _number(result.median("standing"), 0, 100),
     ]
 
 
-def _number(found: "Estimate | None", digits: int, factor: float = 1.0) -> str:
+def _interval(found: "Estimate | None") -> str:
     if found is None:
         return "-"
-    value, low, high = (f"{factor * each:.{digits}f}" for each in (found.value, found.low, found.high))
+    value, low, high = (_short(each, 1) for each in (found.value, found.low, found.high))
     return f"{value} ({low}-{high})"
+
+
+def _number(found: "Estimate | None", digits: int, factor: float = 1.0) -> str:
+    return "-" if found is None else _short(factor * found.value, digits)
+
+
+def _short(value: float, digits: int) -> str:
+    """Return a number of at most five characters, below 10,000."""
+    return f"{value:.{digits if value < 10 else min(digits, 1) if value < 99.95 else 0}f}"
 
 
 def _conditions(cell: "Cell") -> str:
@@ -188,8 +225,9 @@ def _conditions(cell: "Cell") -> str:
         "latency_s": f"+{1000 * found.latency_s:.0f} ms",
         "fps": f"{found.fps:g}/s",
         "errors": f"errors x{found.errors:g}",
-        "reaction_s": f"reaction {1000 * found.reaction_s:.0f} ms",
+        "reaction_s": f"reacts {1000 * found.reaction_s:.0f} ms",
         "through": found.through,
+        "assist": found.assist,
     }
     return ", ".join(word for name, word in words.items() if getattr(found, name) != getattr(usual, name)) or "-"
 

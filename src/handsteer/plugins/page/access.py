@@ -285,3 +285,8 @@ def _cookie(headers: Headers, name: str) -> str | None:
 def _bearer(headers: Headers) -> str | None:
     kind, _, token = headers.get("authorization", "").partition(" ")
     return token if kind.lower() == "bearer" else None
+
+
+def session_of(scope: Scope) -> str:
+    """Return the session of the browser that a request comes from; empty without one."""
+    return str(scope.get("state", {}).get(SESSION, ""))

@@ -124,7 +124,7 @@ class CalibrationPanel:
         node = self._page.node
         if node is None or not self._may_change():
             return
-        node.halt(self._viewer)
+        node.halt(self._viewer, "the calibration")
         sides: list[Side] = [side for side in SIDES if self._sides[side].value]
         await self._try(lambda: self._calibrations.begin(self._viewer, str(self._name.value or ""), sides))
         if self._is_over:  # the viewer has left the page

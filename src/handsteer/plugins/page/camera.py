@@ -1,40 +1,30 @@
 """The camera on the page: its pictures, those of a browser's own webcam, and the choice between them."""
 
 import asyncio
-import math
 import threading
-import uuid
-from collections import deque
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 from contextlib import suppress
+from typing import Final
 
-import cv2
-import numpy as np
 from nicegui import ui
-from numpy.typing import NDArray
-from starlette.responses import StreamingResponse
-from starlette.types import Message, Receive, Scope, Send
+from starlette.types import Message, Scope
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handsteer.cameras import VIRTUAL_HAND
 from handsteer.cameras.choice import BROWSER
-from handsteer.clock import Clock
 from handsteer.errors import CameraError, FrameError, HandsteerError
-from handsteer.images import bgr_image, encode_jpeg
-from handsteer.messages import IMAGE_ANNOTATED, Image
-from handsteer.nodes.base import Node
+from handsteer.plugins.page.access import session_of
 from handsteer.plugins.page.camera_choices import CameraChoices
 from handsteer.plugins.page.elements import box, sentence, switch, text
-from handsteer.plugins.page.first_visit import CameraOffer, Coach
+from handsteer.plugins.page.first_visit import BetterRule, CameraOffer, Coach
 from handsteer.plugins.page.page import PICTURE_PATH, Page
+from handsteer.plugins.page.pictures import CameraPrivacy
 from handsteer.plugins.page.remote_graph import RemoteGraph
 from handsteer.plugins.page.settings import Settings
 from handsteer.plugins.page.sign_pictures import DRAWN
 from handsteer.plugins.page.socket_events import is_page_of
 from handsteer.plugins.page.state import PageState
-from handsteer.plugins.page.viewers import OnDemandNode
 from handsteer.transports.addresses import is_loopback
-from handsteer.transports.base import Received, Transport
 from handsteer.types import NONE, STOP
 
 FRAMES_PER_S = 30.0
@@ -46,6 +36,9 @@ NEXT = "next"
 _CHANGED = "changed"
 """Sent by the browser when its following frames are those of another camera of its device."""
 
+_ALONE: Final = {"alone": True, "shared": False}
+"""Sent by the browser when its pictures are for itself only, and when they no longer are."""
+
 _ANOTHER_CAMERA = 1000
 _NOT_A_FRAME, _NOT_THE_DRIVER, _NO_CAMERA_HERE, _BUSY = 4400, 4403, 4404, 4409
 
@@ -56,11 +49,13 @@ class FrameSocket:
     Args:
         graph: Receives the frames; None if the camera cannot be accessed.
         drives: Returns whether the viewer with this id has the control lease; a free lease is given to it.
+        privacy: Knows who may see them.
     """
 
-    def __init__(self, graph: RemoteGraph | None, drives: Callable[[str], bool]) -> None:
+    def __init__(self, graph: RemoteGraph | None, drives: Callable[[str], bool], privacy: CameraPrivacy) -> None:
         self._graph = graph
         self._drives = drives
+        self._privacy = privacy
         self._in_use = threading.Lock()
 
     async def serve(self, socket: WebSocket) -> None:
@@ -75,9 +70,12 @@ class FrameSocket:
             await socket.close(_BUSY, "another browser gives its camera already")
         else:
             try:
+                alone = socket.query_params.get("seen") == "alone"
+                self._privacy.begin(session_of(socket.scope), alone=alone)
                 await self._receive(socket, self._graph, viewer)
             finally:
                 self._graph.forget_browser()
+                self._privacy.end()
                 self._in_use.release()
 
     async def _receive(self, socket: WebSocket, graph: RemoteGraph, viewer: str) -> None:
@@ -91,8 +89,11 @@ class FrameSocket:
                     return
                 began_s = loop.time()
                 message = await socket.receive()
-                changed = message.get("text") == _CHANGED
-                if not changed:
+                words = message.get("text")
+                changed = words == _CHANGED
+                if words in _ALONE:
+                    self._privacy.set_alone(on=_ALONE[words])
+                elif not changed:
                     graph.offer_frame(_frame_of(message))
                     await asyncio.sleep(max(0.0, began_s + 1 / FRAMES_PER_S - loop.time()))
                     await socket.send_text(NEXT)
@@ -130,106 +131,6 @@ def is_far(scope: Scope) -> bool:
     return not (is_loopback(client[0]) or client[0] == server[0])
 
 
-BYTES_PER_S = 2_000_000
-"""Maximum data rate to one viewer."""
-
-_MAX_PIXELS = 640 * 480
-_BEST_QUALITY, _WORST_QUALITY = 80, 40
-# 60 kB leave room for 30 frames a second within BYTES_PER_S.
-_TOO_LARGE, _SMALL = 60_000, 45_000
-
-_BOUNDARY = b"frame"
-
-
-class PictureNode(Node):
-    """Encodes the newest picture once for all waiting viewers; drops pictures without waiting viewers."""
-
-    def __init__(self, transport: Transport, clock: Clock) -> None:
-        super().__init__("dashboard_picture", transport, clock)
-        self._waiting: deque[asyncio.Future[bytes | None]] = deque()
-        self._has_ended = False
-        self._quality = _BEST_QUALITY
-        self._not_before_s = -math.inf
-        self.subscribe(IMAGE_ANNOTATED, self._on_image)
-
-    async def next_jpeg(self) -> bytes | None:
-        """Return the next picture as a JPEG file; None once the node has been stopped."""
-        future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
-        self._waiting.append(future)
-        return None if self._has_ended else await future
-
-    def on_stop(self) -> None:
-        """End the pictures of all viewers."""
-        self._has_ended = True
-        self._answer(None)
-
-    def _on_image(self, received: Received[Image]) -> None:
-        now = self.clock.now()
-        if not self._waiting or now < self._not_before_s:
-            return
-        jpeg = encode_jpeg(shrink(bgr_image(received.message)), self._quality).tobytes()
-        self._quality = next_quality(self._quality, len(jpeg))
-        self._not_before_s = now + len(jpeg) / BYTES_PER_S
-        self._answer(jpeg)
-
-    def _answer(self, jpeg: bytes | None) -> None:
-        # A deque, because the server's thread appends concurrently, also of a viewer that has this picture already.
-        for _ in range(len(self._waiting)):
-            future = self._waiting.popleft()
-            with suppress(RuntimeError):  # the server has stopped
-                future.get_loop().call_soon_threadsafe(_resolve, future, jpeg)
-
-
-class PictureResponse(StreamingResponse):
-    """Streams pictures to one viewer until it leaves; a slow reader gets fewer pictures, always the newest."""
-
-    def __init__(self, pictures: OnDemandNode[PictureNode]) -> None:
-        super().__init__(
-            self._parts(),
-            media_type=f"multipart/x-mixed-replace; boundary={_BOUNDARY.decode()}",
-            headers={"Cache-Control": "no-store"},
-        )
-        self._pictures = pictures
-        self._viewer = uuid.uuid4()
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send pictures; return when the viewer has left or the pictures have ended."""
-        try:
-            await super().__call__(scope, receive, send)
-        finally:
-            self._pictures.leave(self._viewer)
-
-    async def _parts(self) -> AsyncIterator[bytes]:
-        node = self._pictures.join(self._viewer)
-        # The boundary directly follows each picture: browsers show a picture only when they see its end.
-        yield b"--" + _BOUNDARY + b"\r\n"
-        while node is not None and (jpeg := await node.next_jpeg()) is not None:
-            header = b"Content-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
-            yield header + jpeg + b"\r\n--" + _BOUNDARY + b"\r\n"
-
-
-def shrink(bgr: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return ``bgr``, (height, width, 3) uint8, scaled down to at most as many pixels as 640x480."""
-    height, width = bgr.shape[:2]
-    scale = math.sqrt(_MAX_PIXELS / (height * width))
-    if scale >= 1:
-        return bgr
-    size = (max(1, int(width * scale)), max(1, int(height * scale)))
-    return np.asarray(cv2.resize(bgr, size, interpolation=cv2.INTER_AREA), np.uint8)
-
-
-def next_quality(quality: int, size: int) -> int:
-    """Return the JPEG quality (0 to 100) for the next picture after one of ``size`` bytes at ``quality``."""
-    if size > _TOO_LARGE:
-        return max(_WORST_QUALITY, quality - 10)
-    return min(_BEST_QUALITY, quality + 1) if size < _SMALL else quality
-
-
-def _resolve(future: "asyncio.Future[bytes | None]", jpeg: bytes | None) -> None:
-    if not future.done():
-        future.set_result(jpeg)
-
-
 class CameraPanel:
     """The mirrored picture in its ``stage``, the recognised sign, and the choice of camera if there is a ``graph``.
 
@@ -251,6 +152,7 @@ class CameraPanel:
                 with box("overlay"):
                     self._engaging, self._engage, self._how_to_engage = _engage_ring()
                     self._coach = Coach(page) if coaches else None
+                    self._better = BetterRule(page, settings) if coaches and settings is not None else None
                     self._offer = CameraOffer(page, graph) if graph is not None else None
             with box("foot"):
                 self._ring = box("ring").props('role="progressbar" aria-label="Confirmed" aria-valuemax="100"')
@@ -290,7 +192,10 @@ class CameraPanel:
             self._offer.update()
         if self._coach is not None and (node := self._page.node):
             can_show = self._graph is None or not self._graph.lacks_browser
-            self._coach.update(state, is_driver=can_show and self._page.lease(node).role == "driver")
+            is_driver = can_show and self._page.lease(node).role == "driver"
+            self._coach.update(state, is_driver=is_driver)
+            if self._better is not None:
+                self._better.update(state, is_driver=is_driver)
 
 
 def _engage_ring() -> tuple[ui.element, ui.element, ui.label]:

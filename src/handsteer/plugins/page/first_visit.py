@@ -1,9 +1,12 @@
 """What a first visit shows on the camera's picture: the offer of one's own camera, and three steps to drive by signs.
 
+Who has driven by the tutorial's rule for a minute is offered a better one.
+
 The browser remembers what was done or dismissed (``static/page.js``); it hides what it has seen.
 """
 
 import asyncio
+import time
 from typing import Final
 
 from nicegui import ui
@@ -15,13 +18,16 @@ from handsteer.errors import HandsteerError
 from handsteer.plugins.page.elements import box, button, read_words, sentence, set_property, switch, tag, text
 from handsteer.plugins.page.page import Page
 from handsteer.plugins.page.remote_graph import RemoteGraph
+from handsteer.plugins.page.settings import Settings
+from handsteer.plugins.page.settings_fields import FIELDS
 from handsteer.plugins.page.sign_pictures import DRAWN
 from handsteer.plugins.page.state import PageState
 from handsteer.types import FORWARD, STOP
 
 _DEMO: Final = (
     "It shows the signs, and the robot obeys. With your camera you drive: your browser asks first, choose Allow. The "
-    "computer that runs handsteer gets the pictures, and all who have its page open see them."
+    "computer that runs handsteer gets the pictures, and all who have its page open see them, "
+    "unless you choose Only me."
 )
 _REFUSALS: Final = {
     "NotAllowedError": (
@@ -36,6 +42,7 @@ _REFUSALS: Final = {
     ),
     "ended": "The camera was disconnected, or another program took it. Press Use my camera to go on.",
 }
+_ALONE: Final = "Others see a drawn hand instead of the pictures of my camera"
 NOT_THE_DRIVER: Final = "Only the driver can change it: ask to drive first."
 _LONGEST_REASON: Final = 200
 
@@ -75,6 +82,7 @@ class CameraOffer:
                 self._browser = button("Use my camera").classes("primary")
                 self._browser.props('data-camera="browser"')
                 self._own = button(f"Back to {graph.camera_name(OWN)}", self._use_own).props('data-camera="own"')
+                self._alone = button("Only me").props(f'data-alone title="{_ALONE}"')
                 button("Keep watching").classes("keep").props('data-seen="demo"')
         ui.on("webcam", lambda event: self._refusal.set_text(refusal(event.args)))
 
@@ -87,6 +95,7 @@ class CameraOffer:
         switch(self._box, "demo", on=names.get(source) == VIRTUAL_HAND)
         switch(self._box, "off", on=self._graph.lacks_browser)
         switch(self._browser, "hidden", on=source == BROWSER and self._graph.state.has_browser)
+        switch(self._alone, "hidden", on=not self._page.may_be_alone)
         has_own = any(each.source == OWN for each in self._graph.state.cameras)
         switch(self._own, "hidden", on=source == OWN or not has_own)
 
@@ -154,3 +163,46 @@ class Coach:
         for number, step in enumerate(self._steps):
             switch(step, "done", on=number < self._done)
             set_property(step, "aria-current", "step" if number == max(0, self._done) else None)
+
+
+OFFERED_S: Final = 60.0
+"""So long has one driven by the tutorial's rule before the other is offered."""
+
+_BETTER: Final = "Drive better: point where to go. Tilt your finger for a curve, raise your hand to go faster."
+_LONGEST_STEP_S: Final = 1.0
+
+
+def driven_s(before_s: float, state: PageState, dt_s: float) -> float:
+    """Return for how long signs have driven by the tutorial's rule, ``dt_s`` after it was ``before_s``."""
+    drives = state.control.source == "signs" and state.mood == "driving"
+    is_tutorials = state.rule is not None and state.rule.rule == "course" and not state.is_joystick
+    return before_s + min(dt_s, _LONGEST_STEP_S) if drives and is_tutorials else before_s
+
+
+class BetterRule:
+    """Offers ``control.rule: point`` to who has driven for a minute without it; for the driver, once."""
+
+    def __init__(self, page: Page, settings: Settings) -> None:
+        self._page, self._settings = page, settings
+        self._driven_s, self._at_s = 0.0, time.monotonic()
+        with box("better off") as self._box:
+            text("", _BETTER)
+            self._trouble = text("trouble", "").props('role="alert"')
+            button("Try it", self._choose).classes("primary")
+            button("Not now", label="Not now: keep driving as before").props('data-seen="better"')
+
+    def update(self, state: PageState, *, is_driver: bool) -> None:
+        """Show ``state``; ``is_driver`` is of a viewer who can show signs."""
+        now_s = time.monotonic()
+        if is_driver and state.camera not in ("", VIRTUAL_HAND):
+            self._driven_s = driven_s(self._driven_s, state, now_s - self._at_s)
+        self._at_s = now_s
+        is_tutorials = state.rule is not None and state.rule.rule == "course" and not state.is_joystick
+        switch(self._box, "off", on=not (is_driver and is_tutorials and self._driven_s >= OFFERED_S))
+
+    def _choose(self) -> None:
+        settings, field = self._settings, FIELDS["control.rule"]
+        why_not = self._page.change(lambda: settings.set(field, "point"), NOT_THE_DRIVER)
+        self._trouble.set_text(why_not)
+        if not why_not:
+            self._page.client.run_javascript("noteSeen('better')")

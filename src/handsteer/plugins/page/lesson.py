@@ -198,17 +198,18 @@ class Lesson:
             return None
         numbers = tuple(each.number for one in self.state.classes for each in one.takes)
         self._learning = filled(self.state.classes)
-        self._set(progress=0.0, message="", take_numbers=numbers, report=None)
+        self._set(progress=0.0, left_s=None, message="", take_numbers=numbers, report=None)
         return self.dataset()
 
-    def advance(self, done: int, of: int) -> None:
-        """Set the number of training steps that are done."""
-        self._set(progress=done / of)
+    def advance(self, done: int, of: int, left_s: float | None = None) -> None:
+        """Set the number of training steps that are done, and the seconds until the last."""
+        self._set(progress=done / of, left_s=left_s)
 
-    def learn(self, model: CustomModel, report: TrainingReport) -> None:
-        """Set the result of the training."""
+    def learn(self, model: CustomModel, report: TrainingReport, took_s: float | None = None) -> None:
+        """Set the result of the training, and how long it took."""
         if self.state.is_training:
-            self._set(progress=None, model=model, report=report, learnt_from=self._learning)
+            speed = {"rows_per_s": self.state.training_rows / took_s} if took_s else {}
+            self._set(progress=None, model=model, report=report, learnt_from=self._learning, **speed)
 
     def end_training(self, message: str = "") -> None:
         """End the training without a result."""

@@ -1,19 +1,19 @@
 """The cards of a lesson: one for each class of hands, with its takes and a live bar."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Final
 
 from nicegui import ui
 
 from handsteer.control.explain import effect_words
-from handsteer.plugins.page.elements import box, button, switch, tag, text
+from handsteer.plugins.page.elements import box, button, sentence, switch, tag, text
 from handsteer.plugins.page.lesson import MOST_TAKES, Lesson
 from handsteer.plugins.page.lesson_panels import ViewerLesson, set_words
 from handsteer.plugins.page.lesson_state import Collected, LessonState, Seen, SignClass, counted
 from handsteer.plugins.page.sign_pictures import DRAWN, draw_hand
 from handsteer.plugins.teach.dataset import typical_hand
-from handsteer.types import NONE
+from handsteer.types import NONE, Action
 
 _SHOWN: Final = 8
 _MOST_SHOWN: Final = 60
@@ -41,8 +41,8 @@ class ClassCards:
             self._examples = {sign: _Example(sign) for sign in DRAWN}
 
     def actions(self) -> Mapping[str, str]:
-        """Return the action that is selected for each sign."""
-        return {card.label: card.action for card in self._cards.values() if card.label != NONE}
+        """Return the action of each sign for which one is selected."""
+        return {card.label: card.action for card in self._cards.values() if card.action}
 
     def update(self, state: LessonState) -> None:
         """Show ``state``."""
@@ -117,6 +117,29 @@ class _Example:
                 self.bar = _Bar(sign, sign)
 
 
+class _ActionChoice:
+    """What the robot does at a sign, one of ``actions``; its ``value`` is empty until one is chosen."""
+
+    def __init__(self, actions: Sequence[Action], chosen: Action | None) -> None:
+        self.value: str = ""
+        with box("does").props('role="group" aria-label="What the robot does"'):
+            self._words = text("faint", "Choose what the robot does:")
+            with box("actions"):
+                self._buttons = {
+                    action: button(action.replace("_", " "), partial(self._choose, action)) for action in actions
+                }
+        for each in self._buttons.values():
+            each.props("aria-pressed=false")
+        if chosen is not None:
+            self._choose(chosen)
+
+    def _choose(self, action: Action) -> None:
+        self.value = action
+        for name, each in self._buttons.items():
+            each.props(f"aria-pressed={'true' if name == action else 'false'}")
+        self._words.set_text(sentence(effect_words(action, None)))
+
+
 class _ClassCard:
     """A class of the lesson, which can be changed; its ``label`` is the sign, or ``NONE``."""
 
@@ -144,8 +167,8 @@ class _ClassCard:
 
     @property
     def action(self) -> str:
-        """The selected action."""
-        return str(self._action.value) if self.label != NONE else ""
+        """The selected action; empty if none is yet."""
+        return self._action.value if self.label != NONE else ""
 
     def update(self, one: SignClass, state: LessonState) -> None:
         """Show ``one``."""
@@ -187,11 +210,9 @@ class _ClassCard:
             self._name.on(event, self._rename)
 
     def _foot(self, lesson: ViewerLesson, one: SignClass) -> None:
-        actions = {
-            action: f"{action.replace('_', ' ')}: {effect_words(action, None)}" for action in lesson.lessons.actions()
-        }
-        value = lesson.lessons.action_of(one.label)
-        self._action = ui.select(actions, label="What it does", value=value).props("outlined dense options-dense")
+        node = lesson.node
+        known = lesson.lessons.chosen_action(one.label, node.state) if node is not None else None
+        self._action = _ActionChoice(lesson.lessons.actions(), known)
         with box("class-foot"):
             self._enabled = ui.switch("Learn it", value=one.is_enabled, on_change=self._enable)
             button("Delete", lambda: lesson.do(lambda of: of.delete_class(one.key)), "Delete the sign")

@@ -94,10 +94,17 @@ class LessonNode(Node):
             training.cancel()
 
     def _learn(self, training: BackgroundTraining) -> None:
+        begun_s, first_s = self.clock.now(), 0.0
+
         def progress(done: int, of: int) -> None:
+            nonlocal first_s
+            if done == 1:
+                first_s = self.clock.now()
+            # The steps take equally long; what precedes the first does not count among them.
+            left_s = (self.clock.now() - first_s) / (done - 1) * (of - done) if done > 1 else None
             with self._lock:
                 if self._training is training:
-                    self._lesson.advance(done, of)
+                    self._lesson.advance(done, of, left_s)
 
         error, result = "", None
         try:
@@ -112,7 +119,7 @@ class LessonNode(Node):
                 return  # it was cancelled
             self._training = None
             if result is not None:
-                self._lesson.learn(*result)
+                self._lesson.learn(*result, took_s=self.clock.now() - begun_s)
             else:
                 self._lesson.end_training(error)
 

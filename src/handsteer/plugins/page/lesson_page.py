@@ -1,5 +1,6 @@
 """The page ``/teach``: teach new signs, see how well they were learnt, and let the running robot use them."""
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Final
@@ -15,8 +16,9 @@ from handsteer.plugins.page.lesson_panels import LessonPanel, StartPanel, Viewer
 from handsteer.plugins.page.lesson_state import LessonState, SignClass, instruction
 from handsteer.plugins.page.node import DashboardNode
 from handsteer.plugins.page.page import Page, PageContext
-from handsteer.plugins.page.sign_pictures import draw_hand
+from handsteer.plugins.page.sign_pictures import draw_joints
 from handsteer.plugins.page.state import PageState
+from handsteer.plugins.teach.dataset import Take
 from handsteer.plugins.teach.report import (
     CustomSignFigures,
     Mistake,
@@ -129,7 +131,13 @@ class _Countdown:
 
 
 _MOST_MISTAKES: Final = 12
+_STRIP: Final = 6
+"""Maximum number of hands by which a take is shown."""
 _LOW_RECALL: Final = 0.9
+_CAPTION: Final = (
+    "A row for each sign that was shown, a column for each that came out. A hand counts twice, as it is and mirrored, "
+    "unless its sign points to a side."
+)
 
 
 class ReportPanel:
@@ -160,29 +168,27 @@ class ReportPanel:
         with ui.element("ul").classes("recalls"):
             for sign in report.signs:
                 _recall(sign)
-        mistakes = [each for each in report.mistakes if self._hand(each, state)]
+        mistakes = [(each, *found) for each in report.mistakes if (found := _take_of(each, state))]
         if mistakes:
             tag("h3", "", "Hands that were not recognised")
+            text("faint", "Large: such a hand, as you see it in a mirror. Small: the whole take, from start to end.")
             with ui.element("ul").classes("mistakes"):
-                for each in mistakes[:_MOST_MISTAKES]:
-                    self._mistake(each, state)
+                for mistake in mistakes[:_MOST_MISTAKES]:
+                    self._mistake(*mistake)
         for words in (*lookalike_words(report), f"{how_it_was_tried(report)}.", false_hands(report)):
             text("faint", words)
         with ui.element("details"):
             tag("summary", "", "Confusion matrix")
             _table(report)
 
-    def _hand(self, mistake: Mistake, state: LessonState) -> str:
-        """Return the drawing of a hand that was not recognised; empty if its take has been deleted."""
-        number = state.take_numbers[mistake.take] if mistake.take < len(state.take_numbers) else 0
-        takes = [each.take for one in state.classes for each in one.takes if each.number == number]
-        return draw_hand(takes[0].hands[mistake.hand].pixels) if takes else ""
-
-    def _mistake(self, mistake: Mistake, state: LessonState) -> None:
-        number = state.take_numbers[mistake.take]
+    def _mistake(self, mistake: Mistake, number: int, place: int, take: Take) -> None:
         with ui.element("li"):
-            ui.html(self._hand(mistake, state), sanitize=False)
-            text("", mistake_words(mistake))
+            with box("shown"):
+                ui.html(draw_joints(take.hands[mistake.hand].pixels), sanitize=False)
+                with box("strip"):
+                    for hand in take.hands[:: math.ceil(len(take.hands) / _STRIP)]:
+                        ui.html(draw_joints(hand.pixels), sanitize=False)
+            text("", mistake_words(mistake, place, take.times_s[mistake.hand] - take.times_s[0]))
             button(
                 "Delete",
                 partial(self._lesson.do, lambda of: of.delete_take(number)),
@@ -190,12 +196,23 @@ class ReportPanel:
             )
 
 
-def mistake_words(mistake: Mistake) -> str:
-    """Return what the hands of a take were mistaken for, in words."""
+def _take_of(mistake: Mistake, state: LessonState) -> tuple[int, int, Take] | None:
+    """Return the number, place in its class from 1, and take of a mistake; None if it has been deleted."""
+    number = state.take_numbers[mistake.take] if mistake.take < len(state.take_numbers) else 0
+    found = (
+        (number, place, each.take)
+        for one in state.classes
+        for place, each in enumerate(one.takes, 1)
+        if each.number == number
+    )
+    return next(found, None)
+
+
+def mistake_words(mistake: Mistake, place: int, at_s: float) -> str:
+    """Return what the hands of the take at ``place`` were mistaken for, such as the hand ``at_s`` from its start."""
     counts = f"{mistake.hands.count} of {mistake.hands.of} hands"
-    if mistake.seen == NONE:
-        return f"{mistake.shown}: in this take, {counts} were not recognised"
-    return f"{mistake.shown}: in this take, {counts} were recognised as {mistake.seen}"
+    seen = "not recognised" if mistake.seen == NONE else f"recognised as {mistake.seen}"
+    return f"{mistake.shown}, take {place}: {counts} were {seen}, such as this one, {at_s:.1f} s after its start"
 
 
 def _recall(sign: CustomSignFigures) -> None:
@@ -208,13 +225,13 @@ def _recall(sign: CustomSignFigures) -> None:
         with box("meter").props(f'role="meter" aria-valuenow={100 * rate:.0f}') as meter:
             box("low" if rate < _LOW_RECALL else "good").style(f"width: {100 * rate:.0f}%")
         meter.props["aria-label"] = f"Recall of {sign.summary.label}"
-        text("faint", f"{rate:.0%} of {sign.recall.of} hands")
+        text("faint", f"{rate:.0%} of {sign.hands_tried} hands")
 
 
 def _table(report: TrainingReport) -> None:
     labels, counts = report.confusion.labels, report.confusion.counts
     with box("scroll").props('tabindex=0 role="region" aria-label="Confusion matrix"'), ui.element("table"):
-        tag("caption", "", "A row for each sign that was shown, a column for each that came out, in hands")
+        tag("caption", "", _CAPTION)
         with ui.element("thead"), ui.element("tr"):
             _heads("col", ["shown", *(_named(label) for label in labels)])
         with ui.element("tbody"):

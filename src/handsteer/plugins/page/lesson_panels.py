@@ -8,18 +8,18 @@ from typing import Final, TypeVar
 from nicegui import ui
 
 from handsteer.errors import HandsteerError, install_command
-from handsteer.plugins.page.elements import box, button, card, set_property, switch, text
+from handsteer.plugins.page.elements import box, button, card, sentence, set_property, switch, text
 from handsteer.plugins.page.lesson import Lesson
 from handsteer.plugins.page.lesson_files import CAN_EXPORT, LESSON_PATH
 from handsteer.plugins.page.lesson_node import LessonNode
-from handsteer.plugins.page.lesson_state import LessonState, outcome
+from handsteer.plugins.page.lesson_state import LessonState, outcome, training_words
 from handsteer.plugins.page.lessons import Lessons
 from handsteer.plugins.page.page import Page
 from handsteer.plugins.page.settings import Settings
 from handsteer.plugins.page.settings_fields import FIELDS
 from handsteer.plugins.page.sign_pictures import DRAWN, taught_drawings
 from handsteer.recognition.custom_signs import load_custom_model
-from handsteer.types import Action, find_sign
+from handsteer.types import SIGNS, Action, find_sign
 
 T = TypeVar("T")
 
@@ -73,16 +73,23 @@ class ViewerLesson:
         node = self._page.node
         if node is None or not self.may_change():
             return
-        node.halt(self.viewer)
+        node.halt(self.viewer, "the lesson")
         await self.run(lambda: self.lessons.begin(self.viewer, person, restore=restore))
         if self._is_over:  # the viewer has left the page
             self.lessons.end(self.viewer)
 
-    async def save(self, actions: Mapping[str, str]) -> None:
-        """Keep the takes and the model, with these actions."""
+    async def save(self, actions: Mapping[str, str]) -> bool:
+        """Keep the takes and the model, with these actions; return whether they are kept."""
         error = await self.run(lambda: self.lessons.save(self.viewer, actions))
         if error:
-            self.do(lambda lesson: lesson.say(error))
+            self.do(lambda lesson: lesson.say(sentence(error)))
+        return not error
+
+    async def drive_with(self, actions: Mapping[str, str]) -> None:
+        """Keep the takes and the model, end the lesson, and show the page that the robot is driven on."""
+        if await self.save(actions):
+            self.end()
+            ui.navigate.to("/")
 
     def may_change(self) -> bool:
         """Return whether the viewer drives; show why not."""
@@ -120,7 +127,7 @@ class StartPanel:
         with card("Teach your own signs", "panel start") as self.element:
             text(
                 "lead",
-                "Show a sign to the camera a few times, train for about a minute, and choose what the robot does.",
+                "Show a sign to the camera a few times, train on these takes, and choose what the robot does.",
             )
             self._taught = box("taught")
             self._message = text("trouble", "").props('role="alert"')
@@ -230,12 +237,13 @@ class LessonPanel:
             with box("buttons"):
                 self._train = button("Train", self._begin_training).classes("primary")
                 self._keep = button("Keep", lambda: lesson.save(actions()))
+                self._drive = button("Keep and drive", lambda: lesson.drive_with(actions()))
                 self._undo = button("Undo", lambda: lesson.do(Lesson.undo))
                 with box("files"):
                     viewer = f"viewer={lesson.viewer}"
                     _download("Download", f"{LESSON_PATH}/signs.npz?{viewer}", "Download takes and model as one file")
                     _download("CSV", f"{LESSON_PATH}/takes.csv?{viewer}", "Download the takes as a table, CSV")
-                    self._onnx = _onnx(viewer)
+                    self._onnx = _onnx(viewer, lambda words: lesson.do(lambda of: of.say(words)))
                     button("Upload", label="Upload a file of taught signs").props("data-choose")
                     file = ui.element("input").props(
                         f'type=file accept=".npz" data-upload="{LESSON_PATH}/signs?{viewer}"'
@@ -243,10 +251,10 @@ class LessonPanel:
                     file.classes("hidden").props('aria-label="File of taught signs"')
                 button("End the lesson", lesson.end).classes("end")
             with box("training hidden") as self._training:
-                self._progress = text("", "").props('role="status"')
                 with box("meter progress").props('role="progressbar" aria-label="Training"') as self._meter:
                     self._fill = box("")
                 button("Cancel", self._cancel, "Cancel the training")
+            self._effort = text("faint", "").props('role="status"')
             self._hint = text("hint", "").props('role="status"')
             self._message = text("message", "").props('role="alert"')
             self._lost = text("trouble", "")
@@ -261,7 +269,9 @@ class LessonPanel:
         set_property(self._keep, "disabled", not is_idle)
         to_keep = state.is_fresh and state.is_changed
         switch(self._train, "primary", on=not to_keep)
-        switch(self._keep, "primary", on=to_keep)
+        switch(self._drive, "primary", on=to_keep)
+        switch(self._drive, "hidden", on=not to_keep)
+        set_property(self._drive, "disabled", not is_idle)
         switch(self._onnx, "hidden", on=state.model is None)
         set_words(self._undo, state.undo)
         switch(self._undo, "hidden", on=not state.undo or not is_idle)
@@ -271,15 +281,16 @@ class LessonPanel:
         self._lost.set_text(f"There are no takes of {lost}: training would lose what was learnt of it." if lost else "")
         switch(self._training, "hidden", on=not state.is_training)
         percent = round(100 * (state.progress or 0.0))
-        self._progress.set_text(f"Learning: {percent} %" if percent else "Making hands of every shape")
+        self._effort.set_text(training_words(state))
         self._fill.style(f"width: {percent}%")
         self._meter.props(f"aria-valuenow={percent}")
 
-    def _action_of(self, sign: str) -> Action:
+    def _action_of(self, sign: str) -> Action | None:
+        """Return the action of a shipped sign, or that which is selected for a sign of this lesson."""
+        if sign in SIGNS:
+            return self._lesson.lessons.action_of(sign)
         chosen = self._actions().get(sign)
-        return next((each for each in self._lesson.lessons.actions() if each == chosen), None) or (
-            self._lesson.lessons.action_of(sign)
-        )
+        return next((each for each in self._lesson.lessons.actions() if each == chosen), None)
 
     def _begin_training(self) -> None:
         if node := self._lesson.node:
@@ -297,12 +308,14 @@ def set_words(element: ui.element, words: str) -> None:
         label.set_text(words)
 
 
-def _onnx(viewer: str) -> ui.element:
-    """Return the download as ONNX; a button that does nothing, and says what to install, if its package is missing."""
+def _onnx(viewer: str, say: Callable[[str], object]) -> ui.element:
+    """Return the download as ONNX; a button that only says what to install, by ``say``, if its package is missing."""
     if CAN_EXPORT:
         return _download("ONNX", f"{LESSON_PATH}/signs.onnx?{viewer}", "Download the model as ONNX")
-    missing = button("ONNX").props("disabled")
-    missing.props["title"] = f"For ONNX, run {install_command('onnx')} and start handsteer again"
+    words = f"For ONNX, run {install_command('onnx')} and start handsteer again"
+    # Not disabled, which would hide the words from those who touch, or use the keyboard.
+    missing = button("ONNX", lambda: say(words)).props("aria-disabled=true")
+    missing.props["title"] = words
     return missing
 
 

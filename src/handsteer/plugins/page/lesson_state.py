@@ -11,17 +11,24 @@ from handsteer.control.explain import effect_words
 from handsteer.plugins.teach.collect import Status
 from handsteer.plugins.teach.dataset import Take
 from handsteer.plugins.teach.report import TrainingReport
+from handsteer.plugins.teach.train import training_rows
 from handsteer.recognition.custom_signs import CustomModel
 from handsteer.recognition.features import KNUCKLES, WRIST
 from handsteer.recognition.hand import Hand, SignGuess
 from handsteer.recognition.shipped_signs import SURE
 from handsteer.types import NONE, SIGNS, Action
 
+ROWS_PER_S: Final = 145_000.0
+"""Rows that a training passes over a second, next to a robot that is driven: 1.8 million in 12.3 s on two processors
+(``benchmarks/teach.py``); alone, it is twice as fast."""
+
+_STEP_S: Final = 5
 _SMALL_PX: Final = 60.0
 _ENOUGH_HANDS: Final = 15
 _LEAST_TURN_RAD: Final = np.radians(6.0)
 _LEAST_GROWTH: Final = 1.12
 
+UNDECIDED: Final = "choose on its card what the robot does"
 NO_HAND: Final = "No hand is in view."
 SMALL: Final = "Come nearer: the hand is small in the picture."
 STILL: Final = "Move the hand a little: nearer, farther, tilted."
@@ -124,6 +131,8 @@ class LessonState:
         hint: What to improve; empty if nothing.
         undo: What can be undone, as the label of a button; empty if nothing.
         progress: Of the training, 0 to 1; None if there is none.
+        left_s: Seconds until the training ends; None if it is not known yet.
+        rows_per_s: Rows that a training passes over a second.
         message: The last error, or what has happened; empty if nothing.
         model: The model that is tried; None if no sign has been learnt yet.
         learnt_from: The classes that ``model`` was learnt from in this lesson; None if it is an earlier one.
@@ -141,6 +150,8 @@ class LessonState:
     hint: str = ""
     undo: str = ""
     progress: float | None = None
+    left_s: float | None = None
+    rows_per_s: float = ROWS_PER_S
     message: str = ""
     model: CustomModel | None = None
     learnt_from: tuple[SignClass, ...] | None = None
@@ -176,6 +187,11 @@ class LessonState:
             return ()
         return tuple(sign for sign in self.model.labels if not any(each.label == sign for each in self.classes))
 
+    @property
+    def training_rows(self) -> int:
+        """Number of rows that a training now would pass over."""
+        return training_rows(sum(bool(each.takes) and each.is_enabled for each in self.classes if each.label != NONE))
+
     def of(self, key: int) -> SignClass | None:
         """Return the class ``key``, if it exists."""
         return next((each for each in self.classes if each.key == key), None)
@@ -193,6 +209,18 @@ def counted(one: SignClass) -> str:
     return f"1 take, {one.hands} hands" if len(one.takes) == 1 else f"{len(one.takes)} takes, {one.hands} hands"
 
 
+def training_words(state: LessonState) -> str:
+    """Return how far the training is, or how long one would take; empty if there is nothing to learn from."""
+    if state.progress is not None:
+        if state.left_s is None:
+            return "Making hands of every shape"
+        return f"Learning: {state.progress:.0%}, about {math.ceil(state.left_s)} s left"
+    if not state.can_train:
+        return ""
+    expected_s = state.training_rows / state.rows_per_s
+    return f"Training takes about {_STEP_S * math.ceil(expected_s / _STEP_S)} s here."
+
+
 def instruction(state: LessonState) -> tuple[str, str]:
     """Return the current instruction while takes are recorded: a number, and words."""
     one = state.of(state.recorded) if state.recorded is not None else None
@@ -203,7 +231,7 @@ def instruction(state: LessonState) -> tuple[str, str]:
     return str(math.ceil(state.status.left_s)), f"then {shown}"
 
 
-def outcome(seen: Seen | None, least: float, action_of: Callable[[str], Action]) -> tuple[str, str]:
+def outcome(seen: Seen | None, least: float, action_of: Callable[[str], Action | None]) -> tuple[str, str]:
     """Return in words how the hand is recognised, and what the robot would do; a sign counts from ``least`` on."""
     if seen is None:
         return "No picture", "no picture comes from the camera"
@@ -211,4 +239,5 @@ def outcome(seen: Seen | None, least: float, action_of: Callable[[str], Action])
         return "No hand", "the robot would stop: no hand is in view"
     if seen.sign == NONE or seen.confidence < least:
         return "No sign", "the robot would stop: the hand shows none of the signs"
-    return f"{seen.sign}, {seen.confidence:.0%}", f"would mean: {effect_words(action_of(seen.sign), None)}"
+    action = action_of(seen.sign)
+    return f"{seen.sign}, {seen.confidence:.0%}", f"would mean: {effect_words(action, None)}" if action else UNDECIDED

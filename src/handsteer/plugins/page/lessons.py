@@ -95,6 +95,12 @@ class Lessons:
         """Return the current or default action of the sign ``label``."""
         return action_of(label, self._graph.config.control.actions)
 
+    def chosen_action(self, label: str, state: LessonState) -> Action | None:
+        """Return the action of the sign ``label``; None if none was ever chosen for it."""
+        actions = self._graph.config.control.actions
+        in_use = state.kept_model.labels if state.kept_model is not None else ()
+        return action_of(label, actions) if find_sign(label, [*actions, *in_use]) else None
+
     def begin(self, viewer: str, person: str = "", *, restore: bool = False) -> None:
         """Begin a lesson on the takes of earlier ones; a lesson abandoned by another viewer ends.
 
@@ -133,7 +139,7 @@ class Lessons:
         The robot obeys the signs as soon as it may move again, each by its action of ``actions``.
 
         Raises:
-            ConfigError: An action does not exist, or the running nodes reject a sign.
+            ConfigError: An action does not exist or was never chosen, or the running nodes reject a sign.
             DatasetError: The file of takes has changed, or cannot be written.
             ModelError: The model cannot be written.
         """
@@ -149,6 +155,9 @@ class Lessons:
                 raise DatasetError(f"{path} was changed by another program: end the lesson, and begin another")
             message = KEPT_TAKES
             if state.model is not None and (state.is_fresh or state.learnt_from is None):
+                for label in state.model.labels:
+                    if label in labels and label not in effects and self.chosen_action(label, state) is None:
+                        raise ConfigError(f"choose first what the robot does at {label}")
                 if state.is_fresh:
                     save_custom_model(state.model, self.model_path.expanduser())
                 removed = [one.label for one in state.kept if one.label not in labels]

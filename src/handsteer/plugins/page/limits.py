@@ -19,6 +19,9 @@ from typing import Any, Final, cast
 from nicegui import Client
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
+from handsteer.config import DashboardConfig
+from handsteer.errors import DashboardError
+
 MOST_UNKNOWN: Final = 128
 MOST_OF_ONE_ADDRESS: Final = 32
 """A browser opens six connections until it has its session."""
@@ -244,3 +247,22 @@ def limit_log() -> None:
     limit = LogLimit()
     for name in _LOGGERS:
         logging.getLogger(name).addFilter(limit)
+
+
+def load_certificate(config: DashboardConfig) -> ssl.SSLContext | None:
+    """Return what https needs; None without a certificate.
+
+    Raises:
+        DashboardError: It cannot be used.
+    """
+    if config.certificate is None:
+        if config.private_key is not None:
+            raise DashboardError("dashboard.private_key is of no use without dashboard.certificate: give both")
+        return None
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    try:
+        context.load_cert_chain(config.certificate, config.private_key)
+    except OSError as error:  # includes ssl's own errors
+        reason = error.strerror or error
+        raise DashboardError(f"the certificate {config.certificate} cannot be used for https: {reason}") from None
+    return context

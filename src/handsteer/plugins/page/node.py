@@ -34,27 +34,21 @@ from handsteer.nodes.base import Node
 from handsteer.nodes.diagnostics import read_status, split_reporter
 from handsteer.nodes.status import CameraStatus, ControlStatus, RobotStatus
 from handsteer.nodes.steering import SteeringNode
-from handsteer.plugins.page.state import (
-    COMMAND_HOLDS_S,
-    Observed,
-    PageState,
-    Person,
-    Report,
-    Viewers,
-    compose,
-)
+from handsteer.plugins.page.observed import Observed, Person, Report, Task, Viewers
+from handsteer.plugins.page.state import COMMAND_HOLDS_S, PageState, compose
 from handsteer.plugins.page.viewers import ControlLease, PageAudit
 from handsteer.plugins.page.world_state import (
     PERIOD_S,
     Sample,
     VelocityHistory,
     WorldState,
+    arc_points,
     place_in_world,
     scan_points,
 )
 from handsteer.timeouts import HOLD_TIMEOUT_S
 from handsteer.transports.base import KnowsTypes, Received, Transport
-from handsteer.types import Pose2D, Velocity
+from handsteer.types import ZERO, Pose2D, Velocity
 
 _WATCH_PERIOD_S = 0.05
 _FRAME_COUNTS_KEPT = 6
@@ -107,6 +101,7 @@ class DashboardNode(Node):
         self._steered: tuple[str, float] | None = None  # who steered last, and when
         self._last_holder: str | None = None
         self._stopper: str | None = None
+        self._stopped_for: Task = ""
         self._scan_came_s = -math.inf
         self.subscribe(DIAGNOSTICS, self._on_diagnostics, key=_reporter)
         # A subscriber would count as a robot that takes a Twist, so the control's report is used.
@@ -129,6 +124,7 @@ class DashboardNode(Node):
             steers=self._person(holder and self._audit.person_of(holder[0]), viewer),
             steered=self._person(steered[0] if steered and now - steered[1] < _STEERED_S else None, viewer),
             stopped=self._person(self._stopper, viewer),
+            stopped_for=self._stopped_for,
             may_reset=may_reset,
             topic=self._steering.topic if self._steering.is_direct else "",
             stands=self._steering.is_stopped,
@@ -175,19 +171,20 @@ class DashboardNode(Node):
             self._steering.send_to(topic)
         self._audit.say("steering_topic", viewer, f"steers on {topic}", topic)
 
-    def halt(self, viewer: str = "") -> None:
-        """Stop the robot, whether or not ``viewer`` drives."""
+    def halt(self, viewer: str = "", task: Task = "") -> None:
+        """Stop the robot, whether or not ``viewer`` drives: by its Stop, or for a ``task`` of it on the page."""
         with self._lock:
             self._holder = None
-            self._stopper = self._audit.person_of(viewer) or None
+            self._stopper, self._stopped_for = self._audit.person_of(viewer) or None, task
             self._steering.halt()
-        self._audit.say("stop_pressed", viewer, "pressed Stop", level=WARN)
+        done = f"stopped the robot for {task}" if task else "pressed Stop"
+        self._audit.say("stop_pressed", viewer, done, level=WARN)
 
     def reset(self, viewer: str) -> None:
         """Reset Stop if ``viewer`` has the control lease or the lease is free."""
         if self.lease.take(viewer, self.clock.now()):
             with self._lock:
-                self._stopper = None
+                self._stopper, self._stopped_for = None, ""
                 self._steering.reset()
             self._audit.say("reset_pressed", viewer, "pressed Reset")
 
@@ -225,9 +222,8 @@ class DashboardNode(Node):
 
     def _sample(self) -> None:
         now, observed = self.clock.now(), self._observed
-        commanded = observed.command if now - observed.command_came_s < COMMAND_HOLDS_S else None
         measured = observed.measured if now - observed.measured_came_s < _ODOMETRY_HOLDS_S else None
-        self.history.add(Sample(now, commanded, measured))
+        self.history.add(Sample(now, self._command(now), measured))
 
     def _on_diagnostics(self, received: Received[DiagnosticArray]) -> None:
         now = self.clock.now()
@@ -237,6 +233,9 @@ class DashboardNode(Node):
             status = read_status(message) if namespace == self._namespace else None
             if status is None:
                 continue  # of another robot, or another program
+            before = self._observed.last(ControlStatus)
+            if isinstance(status, ControlStatus) and before is not None and before.stopped and not status.stopped:
+                self._stopper, self._stopped_for = None, ""  # also where others have reset it
             reports = {**self._observed.reports, type(status): Report(status, now)}
             self._observed = replace(self._observed, reports=reports)
             if isinstance(status, CameraStatus):
@@ -270,6 +269,10 @@ class DashboardNode(Node):
         if self._believes_control and status.source != "none":
             self._note_command(Velocity(status.linear_mps, status.angular_radps))
 
+    def _command(self, now_s: float) -> Velocity | None:
+        """Return the last command; None if it came too long ago."""
+        return self._observed.command if now_s - self._observed.command_came_s < COMMAND_HOLDS_S else None
+
     def _note_command(self, command: Velocity) -> None:
         self._observed = replace(self._observed, command=command, command_came_s=self.clock.now())
 
@@ -280,7 +283,8 @@ class DashboardNode(Node):
         pose = _pose_of(odometry)
         self._odometry.append((to_seconds(odometry.header.stamp), pose))
         robot = place_in_world(*self._truth, pose) if self._truth else pose
-        self.world = replace(self.world, robot=robot, trail=self.world.trail.to(robot))
+        arc = arc_points(self._command(self.clock.now()) or ZERO, robot)
+        self.world = replace(self.world, robot=robot, trail=self.world.trail.to(robot), arc=arc)
 
     def _on_joints(self, received: Received[JointState]) -> None:
         names, positions = received.message.name, received.message.position.tolist()

@@ -12,17 +12,19 @@ from nicegui import ui
 
 from handsteer import doors
 from handsteer.errors import HandsteerError, PluginError
-from handsteer.plugins.page.access import SESSION
+from handsteer.plugins.page.access import session_of
 from handsteer.plugins.page.calibration import Calibrations
-from handsteer.plugins.page.elements import STATIC, switch, tag, text
+from handsteer.plugins.page.elements import switch, tag, text
 from handsteer.plugins.page.front import Presses
+from handsteer.plugins.page.languages import ENGLISH, preferred_language
 from handsteer.plugins.page.lessons import Lessons
 from handsteer.plugins.page.node import DashboardNode
+from handsteer.plugins.page.pictures import CameraPrivacy
 from handsteer.plugins.page.recordings import Recordings, duration_text
 from handsteer.plugins.page.remote_graph import RemoteGraph
 from handsteer.plugins.page.settings import Settings
 from handsteer.plugins.page.state import PageState
-from handsteer.plugins.page.status_bar import Banner, LeasePanel, TimingLine
+from handsteer.plugins.page.status_bar import Banner, Cues, LeasePanel, TimingLine
 from handsteer.plugins.page.viewers import LeaseStatus, OnDemandNode, PageAudit
 from handsteer.plugins.study.session import Session
 
@@ -70,13 +72,7 @@ _ASSET = {"css": '<link rel="stylesheet" href="{}">', "js": '<script src="{}" de
 _TRANSLATED = '<script src="{0}/languages/{1}.js"></script><script src="{0}/translate.js"></script>'
 # What the browser draws while it still loads the scripts that draw everything else.
 _LOADING = f'<div class="loading" aria-hidden="true" translate="no">{ICON}<b>handsteer</b></div>'
-# The server writes English everywhere. For a browser that prefers another language of static/languages, the script
-# static/translate.js replaces the words where they are shown, by that catalogue.
-ENGLISH = "en"
-LANGUAGES = frozenset({ENGLISH, *(file.stem for file in (STATIC / "languages").glob("*.js"))})
-"""Two-letter codes (ISO 639-1)."""
 
-_LONGEST_HEADER = 500
 _FIRST_LINKS: Final = ("/world", "/teach", "/settings")
 _CAMERA_OFF: Final = "this browser's camera is off: Use my camera"
 _DRIVERS_CAMERA_OFF: Final = "the camera of the driver's browser is off"
@@ -104,6 +100,7 @@ class PageContext:
         recordings: Serves recordings; None if none can be made.
         calibrations: Adapts the signs to a person; None if the graph's nodes run elsewhere.
         presses: Recognises repetitions of a press of Stop.
+        privacy: Who sees the camera of a browser.
     """
 
     node: OnDemandNode[DashboardNode]
@@ -115,6 +112,7 @@ class PageContext:
     recordings: Recordings | None = None
     calibrations: Calibrations | None = None
     presses: Presses = field(default_factory=Presses)
+    privacy: CameraPrivacy = field(default_factory=CameraPrivacy)
 
 
 class Page:
@@ -139,7 +137,7 @@ class Page:
         ui.add_body_html(_LOADING)
         self._speak(preferred_language(self.client.request.headers.get("accept-language", "")))
         webcam = ("webcam.js",) if context.graph is not None else ()
-        for name in ("page.css", "page.js", *webcam, *assets):
+        for name in ("page.css", "page.js", "sound.js", *webcam, *assets):
             ui.add_head_html(_ASSET[name.rpartition(".")[2]].format(f"{ASSETS_PATH}/{name}"))
         self._top(path)
         self._banner = Banner(self._halt, self._reset)
@@ -157,11 +155,22 @@ class Page:
         if recording is not None and is_on:
             self._recorded.set_text(duration_text(recording, node.clock.now()))
         self._banner.update(state)
+        self._cues.update(state)
 
     @property
     def node(self) -> DashboardNode | None:
         """The node while the browser is connected and the page is served, else None."""
         return self._context.node.join(self.client.id) if self.client.has_socket_connection else None
+
+    @property
+    def session(self) -> str:
+        """The session of the browser that shows the page; empty without one."""
+        return session_of(self.client.request.scope)
+
+    @property
+    def may_be_alone(self) -> bool:
+        """Whether this browser gives its camera or may do so, as no other does."""
+        return self._context.privacy.owner in (None, self.session)
 
     def do(self, action: Callable[[DashboardNode, str], object]) -> None:
         """Call ``action`` with the node and this viewer, if the page is in use."""
@@ -188,9 +197,8 @@ class Page:
         return node.lease.status_of(self.client.id, node.clock.now())
 
     def _introduce(self) -> None:
-        request = self.client.request
-        session = request.scope.get("state", {}).get(SESSION, "")
-        self._context.audit.introduce(self.client.id, session, request.client.host if request.client else "")
+        host = self.client.request.client
+        self._context.audit.introduce(self.client.id, self.session, host.host if host else "")
 
     def _speak(self, language: str) -> None:
         if language != ENGLISH:
@@ -204,7 +212,7 @@ class Page:
             ui.html(ICON, sanitize=False)
             tag("h1", "", "handsteer").props("translate=no")
             with ui.element("nav").classes("links"):
-                for target, name in links().items():
+                for target, name in (links() if self._context.study is None else {}).items():
                     ui.link(name, target).props('aria-current="page"' if target == path else "")
             self._timing = TimingLine()
             with ui.element("div").classes("right"):
@@ -214,6 +222,7 @@ class Page:
                 )
                 self._recorded = text("recorded hidden", "").props('title="A recording is being made"')
                 self._source = ui.label("").classes("source chip")
+                self._cues = Cues()
                 with ui.element("button").classes("icon-button theme").props('aria-label="Light or dark"'):
                     ui.html(_THEME_ICON, sanitize=False)
 
@@ -289,28 +298,3 @@ def links() -> dict[str, str]:
     titles = {path: page.title for path, page in added_pages().items() if page.title}
     first = {path: titles[path] for path in _FIRST_LINKS if path in titles}
     return {"/": "Drive"} | first | titles
-
-
-def preferred_language(accept: str) -> str:
-    """Return the language of the page that a browser wants most; English if it wants none of them.
-
-    ``accept`` is its ``Accept-Language`` header (RFC 9110, section 12.5.4), for example ``de-CH, de;q=0.9, en;q=0.8``.
-    """
-    wanted: dict[str, float] = {}
-    for item in accept[:_LONGEST_HEADER].split(","):
-        name, _, weight = item.partition(";")
-        language = name.strip().partition("-")[0].lower()
-        if language in LANGUAGES:
-            wanted[language] = max(_weight(weight), wanted.get(language, 0.0))
-    best = max(wanted, key=wanted.__getitem__, default=ENGLISH)  # the first of equals
-    return best if wanted.get(best, 0.0) > 0.0 else ENGLISH
-
-
-def _weight(parameter: str) -> float:
-    name, _, value = parameter.strip().partition("=")
-    if name.strip().lower() != "q":
-        return 1.0
-    try:
-        return float(value)
-    except ValueError:
-        return 0.0

@@ -157,8 +157,7 @@ class RemoteGraph:
         steering: Runs in this process; not started.
         study: What the page leads a participant through, if anything.
         audit: Publishes what viewers do.
-        world_name: Name of the world that was loaded last.
-        saved_world: Its content when it was loaded or saved.
+        saved_world: The world when it was loaded or saved.
     """
 
     clock: Clock
@@ -166,7 +165,6 @@ class RemoteGraph:
     steering: SteeringNode
     study: Task | None
     audit: PageAudit
-    world_name: str
     saved_world: World | None
 
     def __init__(self, pipe: Pipe) -> None:
@@ -190,7 +188,7 @@ class RemoteGraph:
                 self.state, self.clock, file, self.study = self._begun.result(_LOOK_PERIOD_S)
             except TimeoutError:
                 continue
-            self.world_name, self.saved_world = Path(self.config.robot.world).name, self.state.world
+            self.saved_world = self.state.world
             self.audit = PageAudit(self.transport, self.clock)
             self.steering = make_steering(self.config, self.transport, self.clock)
             return file
@@ -219,7 +217,7 @@ class RemoteGraph:
 
     def enter_world(self, world: World) -> Future[None]:
         """Move the robot to the start of another world."""
-        return self._told(self._request("enter_world", world), "loaded another world")
+        return self._told(self._request("enter_world", world), f"loaded the world {world.name}", about=world.name)
 
     def reset(self) -> Future[None]:
         """Move the robot and all things to their start positions."""

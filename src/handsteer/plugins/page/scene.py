@@ -46,6 +46,7 @@ class WorldView:
                 _draw_floor(self._scene)
             self._trail = TrailLine([], TRAIL_POINTS, 0.05).material("#7aa7ff", 0.75, "both").move(z=0.004)
             self._scan = ScanDots([], 0.05, 0.16).material("#ff6a5e")
+            self._arc = ScanDots([], 0.06, 0.01).material("#7dff9b")
             self._robot = RobotRig(self._scene)
         # After the scene's own handler, which would move the camera.
         self._scene.on("init", lambda: self._robot.look(self._view))
@@ -62,6 +63,8 @@ class WorldView:
             self._trail.extend(shown.trail, world.trail)
         if world.scan != shown.scan:
             self._scan.show(world.scan)
+        if world.arc != shown.arc:
+            self._arc.show(world.arc)
         if world.markers is not shown.markers:
             self._show_obstacles(world.markers)
 
@@ -176,7 +179,7 @@ class RobotRig(Object3D, component=STATIC / "robot-rig.js"):
 
 
 class ScanDots(Object3D, component=STATIC / "scan.js"):
-    """A laser scan, as dots on the floor; its arguments are the points, and the dots' size and height in metres."""
+    """Dots of a laser scan, or of an arc; its arguments are the points, and the dots' size and height in metres."""
 
     def show(self, points: Sequence[Point]) -> None:
         """Draw these points instead of the previous ones."""

@@ -1,7 +1,6 @@
 """The web server of the page, on its own threads next to the graph."""
 
 import functools
-import ssl
 import threading
 import time
 from collections.abc import Callable
@@ -12,6 +11,7 @@ import uvicorn
 from fastapi import FastAPI
 from nicegui import app, core, ui
 from starlette.datastructures import State
+from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
@@ -25,16 +25,16 @@ from handsteer.errors import DashboardError
 from handsteer.making import cmd_vel_topic
 from handsteer.messages import CMD_VEL, Topic
 from handsteer.nodes.steering import SteeringNode
-from handsteer.plugins.page.access import HEADERS, Access, AccessMiddleware
+from handsteer.plugins.page.access import HEADERS, Access, AccessMiddleware, session_of
 from handsteer.plugins.page.calibration import Calibrations
-from handsteer.plugins.page.camera import FrameSocket, PictureNode, PictureResponse
+from handsteer.plugins.page.camera import FrameSocket
 from handsteer.plugins.page.closed_pages import free_when_closed
 from handsteer.plugins.page.drive_page import DrivePage
 from handsteer.plugins.page.elements import STATIC
 from handsteer.plugins.page.front import PagesLoop, StopPath
 from handsteer.plugins.page.lesson_files import serve_lesson_files
 from handsteer.plugins.page.lessons import Lessons
-from handsteer.plugins.page.limits import FRONT_THREAD, Connections, UnconnectedPages, limit_log
+from handsteer.plugins.page.limits import FRONT_THREAD, Connections, UnconnectedPages, limit_log, load_certificate
 from handsteer.plugins.page.node import DashboardNode
 from handsteer.plugins.page.page import (
     ASSETS_PATH,
@@ -47,11 +47,13 @@ from handsteer.plugins.page.page import (
     PageContext,
     added_pages,
 )
+from handsteer.plugins.page.pictures import PictureResponse, Pictures
 from handsteer.plugins.page.recordings import Recordings, serve_recordings
 from handsteer.plugins.page.remote_graph import RemoteGraph
 from handsteer.plugins.page.settings import Settings, SettingsFile
 from handsteer.plugins.page.sign_pictures import serve_sign_pictures
 from handsteer.plugins.page.socket_events import SocketEvents
+from handsteer.plugins.page.study_page import StudyPage
 from handsteer.plugins.page.viewers import OnDemandNode, PageAudit
 from handsteer.plugins.page.world_state import VelocityHistory
 from handsteer.plugins.study.session import Session
@@ -87,7 +89,7 @@ class Dashboard:
 
     Attributes:
         node: Subscribes and steers for the browsers that show the page.
-        pictures: Encodes the camera's picture for the browsers that show it.
+        pictures: Encodes the camera's pictures for the browsers that show them.
         context: What all pages share.
         webcam: Receives the frames of a browser's own camera.
     """
@@ -106,8 +108,9 @@ class Dashboard:
         history = VelocityHistory()  # outlives the node, so that a reloaded page shows it
         audit = PageAudit(transport, clock) if graph is None else graph.audit
         self.node = OnDemandNode(lambda: DashboardNode(transport, clock, steering, cmd_vel, history, audit=audit))
-        self.pictures = OnDemandNode(lambda: PictureNode(transport, clock))
-        self.context = PageContext(self.node, audit)
+        self.pictures = Pictures(transport, clock)
+        privacy = self.pictures.privacy
+        self.context = PageContext(self.node, audit, privacy=privacy)
         if graph is not None:
             settings_file = SettingsFile(file or DEFAULT_FILE, is_read=file is not None)
             settings = Settings(
@@ -119,8 +122,9 @@ class Dashboard:
             study = Session(graph.study) if graph.study is not None else None
             recordings = Recordings(graph.config.recording.folder, lambda: graph.state.recording)
             lessons, calibrations = Lessons(graph), Calibrations(graph)
-            self.context = PageContext(self.node, audit, graph, settings, lessons, study, recordings, calibrations)
-        self.webcam = FrameSocket(graph, self._drives)
+            parts = (settings, lessons, study, recordings, calibrations)
+            self.context = PageContext(self.node, audit, graph, *parts, privacy=privacy)
+        self.webcam = FrameSocket(graph, self._drives, privacy)
         self._config = config
         self._steering = steering
         self._server: uvicorn.Server | None = None
@@ -148,7 +152,7 @@ class Dashboard:
             raise DashboardError("this process serves a page already: stop that one first")
         config = self._config
         try:
-            certificate = _certificate(config)
+            certificate = load_certificate(config)
             listener = listen(
                 config.host, config.port, _SEND_BUFFER_BYTES, options=("--host", "--port"), error=DashboardError
             )
@@ -240,20 +244,6 @@ def _settings(front: ASGIApp, state: State) -> uvicorn.Config:
     return settings
 
 
-def _certificate(config: DashboardConfig) -> ssl.SSLContext | None:
-    if config.certificate is None:
-        if config.private_key is not None:
-            raise DashboardError("dashboard.private_key is of no use without dashboard.certificate: give both")
-        return None
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    try:
-        context.load_cert_chain(config.certificate, config.private_key)
-    except OSError as error:  # includes ssl's own errors
-        reason = error.strerror or error
-        raise DashboardError(f"the certificate {config.certificate} cannot be used for https: {reason}") from None
-    return context
-
-
 @functools.cache
 def _application() -> FastAPI:
     """Return the web application, one per process, as NiceGUI requires; it serves ``state.dashboard``."""
@@ -261,8 +251,8 @@ def _application() -> FastAPI:
     application.mount(ASSETS_PATH, StaticFiles(directory=STATIC))
 
     @application.get(PICTURE_PATH)
-    async def picture() -> Response:
-        return PictureResponse(application.state.dashboard.pictures)
+    async def picture(request: Request) -> Response:
+        return PictureResponse(application.state.dashboard.pictures, session_of(request.scope))
 
     @application.get(MANIFEST_PATH)
     def manifest() -> Response:
@@ -284,7 +274,8 @@ def _application() -> FastAPI:
             free_when_closed(shown_page)
             unconnected.add(shown_page.client)
 
-    serve("/", DrivePage)
+    # A participant has no other page.
+    serve("/", lambda context: DrivePage(context) if context.study is None else StudyPage(context))
     for path, added in added_pages().items():
         serve(path, added)
     ui.run_with(

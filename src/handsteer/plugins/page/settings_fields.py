@@ -54,7 +54,7 @@ COMMON: Mapping[str, str] = MappingProxyType(
         "camera.height": "Picture height",
         "robot.preset": "Known robot",
         "robot.world": "World",
-        "collision_monitor.enabled": "Slow down before obstacles",
+        "control.assist": "Before obstacles",
     }
 )
 """The parameters that people change most, in the order of the page, and their titles."""

@@ -67,6 +67,8 @@ _SIZE: Final = 64
 _MARGIN: Final = 6.0
 _PALM_JOINTS: Final = (0, 1, 5, 9, 13, 17)
 _FINGER_JOINTS: Final = tuple(tuple(range(base, base + 4)) for base in (1, 5, 9, 13, 17))
+_KNUCKLES: Final = (5, 9, 13, 17)
+_TIPS: Final = (4, 8, 12, 16, 20)
 _FARTHEST: Final = 1e6
 
 
@@ -75,10 +77,7 @@ def draw_hand(points: NDArray[Any]) -> str:
 
     ``points`` are (21, 2 or more) finite landmarks in pixels, of an image that is not mirrored.
     """
-    flat = np.asarray(points, np.float64)[:, :2] * (-1, 1)
-    flat = flat - (flat.min(axis=0) + flat.max(axis=0)) / 2
-    longest = max(float(np.ptp(flat, axis=0).max()), 1e-9)
-    places = (flat * ((_SIZE - 2 * _MARGIN) / longest) + _SIZE / 2).round().astype(int)
+    places = _in_box(points)
     # An edge in the card's colour keeps fingers apart that lie in front of the palm or of each other.
     fingers = "".join(f'<path d="{line}" class="edge"/><path d="{line}" class="finger"/>' for line in _lines(places))
     palm = " ".join(_place(places[joint]) for joint in _PALM_JOINTS)
@@ -86,6 +85,18 @@ def draw_hand(points: NDArray[Any]) -> str:
         f'<svg viewBox="0 0 {_SIZE} {_SIZE}" aria-hidden="true" class="landmarks">'
         f'<polygon points="{palm}" class="palm"/>{fingers}</svg>'
     )
+
+
+def draw_joints(points: NDArray[Any]) -> str:
+    """Return a hand as SVG with each of its bones and joints; see :func:`draw_hand`."""
+    places = _in_box(points)
+    bones = "".join(f'<path d="{line}" class="bone"/>' for line in _lines(places, wrist=True))
+    across = f'<path d="M{"L".join(_place(places[joint]) for joint in _KNUCKLES)}" class="bone"/>'
+    joints = "".join(
+        f'<circle cx="{x}" cy="{y}" r="2" class="{"tip" if joint in _TIPS else "joint"}"/>'
+        for joint, (x, y) in enumerate(places)
+    )
+    return f'<svg viewBox="0 0 {_SIZE} {_SIZE}" aria-hidden="true" class="joints">{across}{bones}{joints}</svg>'
 
 
 def taught_drawings(signs: SignsConfig) -> Mapping[str, str]:
@@ -121,8 +132,18 @@ def _points(sent: object) -> NDArray[np.float64] | None:
     return points if points.shape == (21, 2) and (np.abs(points) <= _FARTHEST).all() else None
 
 
-def _lines(places: NDArray[np.int64]) -> list[str]:
-    return ["M" + "L".join(_place(places[joint]) for joint in finger) for finger in _FINGER_JOINTS]
+def _in_box(points: NDArray[Any]) -> NDArray[np.int64]:
+    """Return (21, 2) landmarks mirrored, and scaled into the box of a drawing."""
+    flat = np.asarray(points, np.float64)[:, :2] * (-1, 1)
+    flat = flat - (flat.min(axis=0) + flat.max(axis=0)) / 2
+    longest = max(float(np.ptp(flat, axis=0).max()), 1e-9)
+    places: NDArray[np.int64] = np.rint(flat * ((_SIZE - 2 * _MARGIN) / longest) + _SIZE / 2).astype(np.int64)
+    return places
+
+
+def _lines(places: NDArray[np.int64], *, wrist: bool = False) -> list[str]:
+    first = (0,) if wrist else ()
+    return ["M" + "L".join(_place(places[joint]) for joint in (*first, *finger)) for finger in _FINGER_JOINTS]
 
 
 def _place(place: NDArray[np.int64]) -> str:

@@ -1,116 +1,23 @@
 """Computes what the page shows from the topics' messages: pure functions, without page or transport."""
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Literal, TypeVar
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
 
 from handsteer.config import ControlConfig
 from handsteer.control.explain import Reason
-from handsteer.nodes.status import ERROR, OK, CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
-from handsteer.timeouts import ODOMETRY_S, ROBOT_S
+from handsteer.nodes.status import ERROR, OK, ControlStatus, RecognitionStatus, RobotStatus
+from handsteer.plugins.page.observed import NO_VIEWERS, STALE_S, Observed, Reporting, Viewers, caught_up
+from handsteer.timeouts import ROBOT_S
 from handsteer.types import NONE, SIGNS, ZERO, Velocity
 
-S = TypeVar("S", bound=Status)
-
 Mood = Literal["driving", "standing", "trouble", "waiting"]
-
-STALE_S = 2.0
-"""A node that has not reported for this long counts as silent; the slowest reports twice a second."""
 
 COMMAND_HOLDS_S = ROBOT_S
 """A command expires after this time, as in the robot's controller."""
 
-
-@dataclass(frozen=True)
-class Report:
-    """The last report of a node on ``/diagnostics``, and its time of arrival in seconds of the graph's clock."""
-
-    status: Status
-    came_s: float
-
-
-Person = Literal["", "you", "another viewer"]
-"""A viewer, as seen by one of them; empty if none."""
-
-
-@dataclass(frozen=True)
-class Viewers:
-    """The viewers' activity, as seen by one of them.
-
-    Attributes:
-        steers: The viewer who steers.
-        steered: The viewer who steers, or did a moment ago, when the control's report may be older.
-        stopped: The viewer who pressed Stop last.
-        may_reset: Whether this viewer may reset Stop.
-        topic: The topic of steering that bypasses the control; empty otherwise.
-        stands: Whether steering is disabled by Stop; used if no control reports Stop.
-        waits: Whether what steers has to be released first.
-    """
-
-    steers: Person = ""
-    steered: Person = ""
-    stopped: Person = ""
-    may_reset: bool = True
-    topic: str = ""
-    stands: bool = False
-    waits: bool = False
-
-
-NO_VIEWERS = Viewers()
-
-
-@dataclass(frozen=True)
-class Observed:
-    """The newest of everything that the page shows in figures.
-
-    Attributes:
-        reports: The last report of each node, by the type of its status.
-        command: The last velocity command.
-        command_came_s: Its time of arrival in seconds of the graph's clock.
-        measured: The velocity from odometry.
-        measured_came_s: Its time of arrival, likewise.
-        frame_counts: Times and frame counters of the camera's last reports, oldest first.
-    """
-
-    reports: Mapping[type[Status], Report] = field(default_factory=dict)
-    command: Velocity = ZERO
-    command_came_s: float = -math.inf
-    measured: Velocity = ZERO
-    measured_came_s: float = -math.inf
-    frame_counts: Sequence[tuple[float, float]] = ()
-
-    def is_moving(self, now_s: float) -> bool:
-        """Return whether the robot is measured to move at ``now_s``."""
-        return now_s - self.measured_came_s < ODOMETRY_S and not self.measured.is_rest
-
-    def last(self, kind: type[S], since_s: float = -math.inf) -> S | None:
-        """Return the last status of this type; None if it was not reported at ``since_s`` or later."""
-        report = self.reports.get(kind)
-        if report is None or report.came_s <= since_s or not isinstance(report.status, kind):
-            return None
-        return report.status
-
-
-@dataclass(frozen=True)
-class Reporting:
-    """The status of each node that reports; None for one that is silent."""
-
-    camera: CameraStatus | None = None
-    recognition: RecognitionStatus | None = None
-    control: ControlStatus | None = None
-    robot: RobotStatus | None = None
-
-    @classmethod
-    def at(cls, now_s: float, observed: Observed) -> "Reporting":
-        """Return the nodes that report at ``now_s``, in seconds of the graph's clock."""
-        since_s = now_s - STALE_S
-        return cls(
-            observed.last(CameraStatus, since_s),
-            observed.last(RecognitionStatus, since_s),
-            observed.last(ControlStatus, since_s),
-            observed.last(RobotStatus, since_s),
-        )
+_LASTING_S: Final = 1.0
+_WITHOUT_FRAMES: Final = "connect the camera again, or choose another"
 
 
 @dataclass(frozen=True)
@@ -171,7 +78,7 @@ class PageState:
 
 def compose(observed: Observed, now_s: float, viewers: Viewers = NO_VIEWERS) -> PageState:
     """Return the page's state at ``now_s``, in seconds of the graph's clock, as one of its ``viewers`` sees it."""
-    reporting = Reporting.at(now_s, observed)
+    reporting = caught_up(Reporting.at(now_s, observed), observed)
     recognition, control = reporting.recognition or RecognitionStatus(), reporting.control or ControlStatus()
     robot = reporting.robot or RobotStatus()
     mood, headline, reason = explain(reporting, viewers, is_moving=observed.is_moving(now_s))
@@ -212,7 +119,7 @@ def why_no_picture(reporting: Reporting) -> str:
         return ""
     if camera is not None and camera.level >= ERROR:
         return camera.message
-    return "no report yet" if recognition is None else recognition.message
+    return "no report yet" if recognition is None else _what_recognition_says(recognition)
 
 
 def is_stopped(control: ControlStatus | None, viewers: Viewers) -> bool:
@@ -250,7 +157,8 @@ def explain(reporting: Reporting, viewers: Viewers = NO_VIEWERS, *, is_moving: b
     if robot.level >= ERROR:
         return "trouble", "Trouble", f"the robot {robot.message}"
     if control is None or stopped:
-        by = f"by {viewers.stopped}, " if viewers.stopped else ""
+        by = f"for {viewers.stopped_for}, " if viewers.stopped_for else f"by {viewers.stopped}, "
+        by = by if viewers.stopped_for or viewers.stopped else ""
         return (
             "trouble",
             "Stopping" if is_moving else "Stopped",
@@ -285,7 +193,14 @@ def _why_no_sign(reporting: Reporting) -> tuple[Mood, str | None]:
         return "trouble", reporting.camera.message
     if reporting.recognition is None:
         return "trouble", "the node hand_sign_recognition does not report"
-    return "standing", reporting.recognition.message if reporting.recognition.sign == NONE else None
+    return "standing", _what_recognition_says(reporting.recognition) if reporting.recognition.sign == NONE else None
+
+
+def _what_recognition_says(recognition: RecognitionStatus) -> str:
+    is_lasting = recognition.no_frame_s is not None and recognition.no_frame_s >= _LASTING_S
+    return (
+        f"{recognition.message}: {_WITHOUT_FRAMES}" if is_lasting and not recognition.refused else recognition.message
+    )
 
 
 def frame_rate(counts: Sequence[tuple[float, float]], now_s: float) -> float | None:

@@ -1,16 +1,19 @@
 """What the top of every page shows: the control lease, the reaction time, and the banner with the Stop button."""
 
+import json
 import math
 import re
 import time
 from collections.abc import Callable
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import ClassVar, Final
 
 from nicegui import ui
 
 from handsteer.plugins.page.elements import box, button, sentence, set_property, switch, text
 from handsteer.plugins.page.state import PageState
 from handsteer.plugins.page.viewers import LeaseStatus, Role
+from handsteer.types import NONE
 
 UNKNOWN = "--"
 """Shown for an unknown value."""
@@ -27,11 +30,12 @@ class LeasePanel:
 
     def __init__(self, ask: Callable[[], None], answer: Callable[[bool], None]) -> None:
         with box("lease"):
-            self._question = text("question", "")
             self._words = text("role chip", "")
             self._ask = button("Ask to drive", ask).classes("hidden")
-            self._yes = button("Hand over", lambda: answer(True)).classes("hidden")
-            self._no = button("Keep", lambda: answer(False)).classes("hidden")
+            with box("request"):
+                self._question = text("question", "")
+                self._yes = button("Hand over", lambda: answer(True)).classes("hidden")
+                self._no = button("Keep", lambda: answer(False)).classes("hidden")
 
     def update(self, place: LeaseStatus) -> None:
         """Show the lease as this viewer sees it."""
@@ -81,6 +85,61 @@ _TIME = re.compile(r" for \d+(\.\d+)? s\b")
 def spoken(state: PageState) -> str:
     """Return the banner's sentence for a screen reader, without times, which would be read out at each change."""
     return ". ".join([f"{state.headline}: {_TIME.sub('', state.reason)}", *state.warnings])
+
+
+_SOUND: Final = "Tones and words for ready, each sign, and Stop"
+_SOUND_ICON = (
+    '<svg viewBox="0 0 24 24" fill="none" stroke="currentColor" stroke-width="2" stroke-linecap="round" '
+    'aria-hidden="true"><path d="M4 10v4h4l5 4V6L8 10z" fill="currentColor"/><path d="M16 9a4 4 0 0 1 0 6"/>'
+    '<path d="M19 6a8 8 0 0 1 0 12" class="wave"/></svg>'
+)
+
+
+@dataclass(frozen=True)
+class Notable:
+    """What the driver must notice while looking at the robot.
+
+    Attributes:
+        stopped: Whether the robot is stopped until reset.
+        ready: Whether signs are obeyed.
+        sign: The sign that is obeyed, or ``NONE``.
+    """
+
+    stopped: bool
+    ready: bool
+    sign: str
+
+    @classmethod
+    def of(cls, state: PageState) -> "Notable":
+        """Return what is notable in ``state``."""
+        ready = not state.stopped and state.control.armed and state.control.engaged
+        return cls(state.stopped, ready, state.recognition.sign if ready else NONE)
+
+    def news_since(self, before: "Notable") -> tuple[str, str] | None:
+        """Return the tone and the words for what has changed, the most important only; None if nothing has."""
+        if self.stopped != before.stopped:
+            return ("stopped", "Stopped") if self.stopped else None
+        if self.ready and not before.ready:
+            return "ready", "Ready for signs"  # a Stop that is shown then is how it became ready
+        return ("sign", f"Sign accepted: {self.sign}") if self.sign not in (NONE, before.sign) else None
+
+
+class Cues:
+    """The switch of tones and words, which ``static/sound.js`` plays and says if this browser has switched them on."""
+
+    def __init__(self) -> None:
+        self._before: Notable | None = None
+        with ui.element("button").classes("icon-button sound") as self._switch:
+            ui.html(_SOUND_ICON, sanitize=False)
+        self._switch.props(f'aria-pressed=false aria-label="{_SOUND}" title="{_SOUND}"')
+        text("cue", "").props('aria-live="assertive"')
+
+    def update(self, state: PageState) -> None:
+        """Play and say what has changed."""
+        before, self._before = self._before, Notable.of(state)
+        news = self._before.news_since(before) if before is not None else None
+        if news is not None:
+            self._switch.client.run_javascript(f"window.cue?.({json.dumps(news[0])}, {json.dumps(news[1])})")
 
 
 _PRESS = "() => emit({ press: window.pressStop?.() ?? 0 })"

@@ -92,7 +92,7 @@ class StudyPage(Page):
             self._card.message = _WATCHED
             return
         self._begins, self._card.message = True, ""
-        node.halt(self.client.id)
+        node.halt(self.client.id, "the lap")
         try:
             if self._graph.config != session.config:
                 await asyncio.to_thread(self._graph.reconfigure, session.config)
@@ -128,7 +128,7 @@ class StudyPage(Page):
             return
         self.lead(lambda: session.note(state.robot.course, state.robot.path_length_m, node.clock.now()))
         if session.lap is None:
-            node.halt(self.client.id)
+            node.halt(self.client.id, "the lap")
         elif lap.course is None and session.lap.course is not None:
             node.reset(self.client.id)
 

@@ -18,9 +18,6 @@ MOST_STEPS = 50
 _ANSWER_TIMEOUT_S = 5.0
 
 
-Named = tuple[World, str]
-"""A world, and the name that it was loaded by."""
-
 Step = Literal[-1, 1]
 """Undo, or redo."""
 
@@ -29,22 +26,22 @@ class History:
     """The present world between those before and after it; forgotten when the world was changed by others."""
 
     def __init__(self) -> None:
-        self._worlds: list[Named] = []  # oldest first
+        self._worlds: list[World] = []  # oldest first
         self._at = 0  # the present one
 
-    def note(self, before: Named, now: Named) -> None:
+    def note(self, before: World, now: World) -> None:
         """Remember the change from ``before`` to ``now``."""
         self.follow(before)
         if now != before:
             self._worlds = [*self._worlds[: self._at + 1][-MOST_STEPS:], now]
             self._at = len(self._worlds) - 1
 
-    def follow(self, now: Named) -> None:
+    def follow(self, now: World) -> None:
         """Forget everything if ``now`` is not the result of the last change."""
         if not self._worlds or now != self._worlds[self._at]:
             self._worlds, self._at = [now], 0
 
-    def to(self, step: Step) -> Named | None:
+    def to(self, step: Step) -> World | None:
         """Return the world that undo (-1) or redo (1) leads to."""
         at = self._at + step
         return self._worlds[at] if 0 <= at < len(self._worlds) else None
@@ -82,7 +79,9 @@ class WorldDesk:
 
     def stop(self) -> None:
         """Stop the robot, unless it is stopped: it should not move while its world is edited."""
-        self._page.do(lambda node, viewer: None if node.state(viewer).stopped else node.halt(viewer))
+        self._page.do(
+            lambda node, viewer: None if node.state(viewer).stopped else node.halt(viewer, "the world editor")
+        )
 
     async def restart(self) -> None:
         """Move the robot and all things to their start positions."""
@@ -91,19 +90,19 @@ class WorldDesk:
 
     def follow(self) -> None:
         """Forget the changes that can be undone, if the world was changed by others."""
-        if not self._changing.locked() and (now := self._named()):
-            self.history.follow(now)
+        if not self._changing.locked() and self.world is not None:
+            self.history.follow(self.world)
 
     async def change(self, change: Change, done: str = "") -> bool:
         """Stop the robot, make ``change`` and show ``done``; return whether it succeeded."""
         graph = self.changeable()
         return graph is not None and await self._do(lambda: graph.change_world(change), done)
 
-    async def enter(self, world: World, name: str) -> None:
+    async def enter(self, world: World) -> None:
         """Stop the robot and load another world."""
         if graph := self.changeable():
-            done = f"Loaded {name}; the robot is at the start."
-            if await self._do(lambda: graph.enter_world(world), done, name):
+            done = f"Loaded {world.name}; the robot is at the start."
+            if await self._do(lambda: graph.enter_world(world), done):
                 graph.saved_world = world
 
     async def undo(self) -> None:
@@ -114,16 +113,13 @@ class WorldDesk:
         """Make again the last change that was undone."""
         await self._go(1, "Made again.", "There is nothing to make again.")
 
-    async def _do(self, request: Callable[[], Future[None]], done: str, name: str | None = None) -> bool:
+    async def _do(self, request: Callable[[], Future[None]], done: str) -> bool:
         async with self._changing:
-            before = self._named()
+            before = self.world
             self.stop()
             succeeded = await self._wait_for(request(), done)
-            if succeeded and self.graph is not None:
-                self.graph.world_name = name or self.graph.world_name
-                now = self._named()
-                if before is not None and now is not None:
-                    self.history.note(before, now)
+            if succeeded and before is not None and self.world is not None:
+                self.history.note(before, self.world)
             return succeeded
 
     async def _go(self, step: Step, done: str, none: str) -> None:
@@ -137,12 +133,8 @@ class WorldDesk:
                 self._show(none)
                 return
             self.stop()
-            if await self._wait_for(graph.change_world(partial(replace, by=target[0])), done):
-                graph.world_name = target[1]
+            if await self._wait_for(graph.change_world(partial(replace, by=target)), done):
                 self.history.go(step)
-
-    def _named(self) -> Named | None:
-        return (self.world, self.graph.world_name) if self.graph is not None and self.world is not None else None
 
     async def _wait_for(self, change: Future[None], done: str) -> bool:
         """Return whether ``change`` succeeded; show ``done``, or the error."""

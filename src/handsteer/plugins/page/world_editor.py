@@ -2,8 +2,10 @@
 
 import asyncio
 import math
+import re
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any, get_args
 
 from nicegui import ui
@@ -27,7 +29,16 @@ from handsteer.robots.editing import (
     remove,
     reorder,
 )
-from handsteer.robots.world import Gate, Thing, World, load_world, parse_world, shipped_worlds, write_world
+from handsteer.robots.world import (
+    Gate,
+    Thing,
+    World,
+    load_world,
+    named_by_file,
+    parse_world,
+    shipped_worlds,
+    write_world,
+)
 from handsteer.types import Pose2D
 
 LARGEST_FILE_BYTES = 64 * 1024
@@ -105,6 +116,8 @@ class WorldEditor:
         world = self._desk.world
         if world is not None and world is not self._world:
             fit, self._world = self._world is None, world
+            own = [world.name] if world.name not in shipped_worlds() else []
+            self._worlds.set_options([*own, *shipped_worlds()], value=world.name)
             self._desk.follow()
             self._plan.show(world, fit=fit)
             self._refresh()
@@ -193,31 +206,33 @@ class WorldEditor:
     async def _load(self) -> None:
         name = self._worlds.value
         if name in shipped_worlds():  # not a path chosen by a browser
-            await self._enter(load_world(name), name)
+            await self._enter(load_world(name))
+        else:
+            self._show(f"{name} is loaded already: choose another world, or open a file.")
 
     async def _open_file(self, sent: object) -> None:
         if self._desk.changeable() is None:
             return
         try:
             name, content = read_file(sent)
-            world = await asyncio.to_thread(parse_world, content, name)
+            world = named_by_file(await asyncio.to_thread(parse_world, content, name), Path(name))
             if len(world.obstacles) > MOST_OBSTACLES:
                 raise WorldError(f"{name}: has {len(world.obstacles)} things; the page takes {MOST_OBSTACLES} at most")
         except WorldError as error:
             self._show(str(error))
         else:
-            await self._enter(world, name)
+            await self._enter(world)
 
-    async def _enter(self, world: World, name: str) -> None:
-        await self._desk.enter(world, name)
+    async def _enter(self, world: World) -> None:
+        await self._desk.enter(world)
         self._world = None  # shown again, to fit
         self.update()
 
     def _save(self) -> None:
         graph, world = self._desk.graph, self._desk.world
         if graph is not None and world is not None:
-            name = graph.world_name.removesuffix(".yaml").removesuffix(".yml")
-            ui.download.content(write_world(world), f"{name}.yaml", "application/yaml")
+            name = re.sub(r'[\\/:*?"<>|]', "-", world.name)  # what file systems refuse
+            ui.download.content(write_world(world), f"{name or 'world'}.yaml", "application/yaml")
             graph.saved_world = world
 
     def _refresh(self) -> None:

@@ -1,5 +1,8 @@
 """The page ``/world``: edits the world of the simulated robot, seen from above."""
 
+from functools import partial
+from typing import Final
+
 from nicegui import ui
 
 from handsteer.plugins.page.elements import box, button, card, set_property, switch, tag, text
@@ -9,8 +12,10 @@ from handsteer.plugins.page.state import PageState
 from handsteer.plugins.page.world_desk import WorldDesk
 from handsteer.plugins.page.world_editor import WorldEditor
 from handsteer.plugins.page.world_plan import WorldPlan
+from handsteer.robots.editing import rename
 
 _STOPS = "A change stops the robot, and it stays stopped until you press Reset."
+_LONGEST: Final = 200
 
 
 class WorldPage(Page):
@@ -21,9 +26,13 @@ class WorldPage(Page):
     def __init__(self, context: PageContext) -> None:
         super().__init__(context, "/world", "world-editor.css")
         graph = context.graph
+        self._shown_name: str | None = None
         with box("world-editor"):
             with ui.element("section").classes("card panel bar"):
-                self._name = tag("h2", "name", "World")
+                tag("h2", "", "World")
+                self._name = ui.input("Name of the world").props("outlined dense maxlength=60").classes("name")
+                for event in ("blur", "keydown.enter"):
+                    self._name.on(event, self._rename)
                 self._saved = text("saved", "")
                 self._undo = button("Undo", label="Undo the last change (Ctrl-Z)")
                 self._redo = button("Redo", label="Make the change again (Ctrl-Shift-Z)")
@@ -60,11 +69,19 @@ class WorldPage(Page):
         graph, world, history = self._desk.graph, self._desk.world, self._desk.history
         if graph is not None and world is not None:
             is_saved = graph.saved_world == world
-            self._name.set_text(graph.world_name)
+            if world.name != self._shown_name:
+                self._shown_name = world.name
+                self._name.set_value(world.name)
             self._saved.set_text("no unsaved changes" if is_saved else "unsaved changes")
             switch(self._saved, "unsaved", on=not is_saved)
         for element, target in ((self._undo, history.to(-1)), (self._redo, history.to(1))):
             set_property(element, "disabled", target is None)
+
+    async def _rename(self) -> None:
+        name, world = " ".join(str(self._name.value or "").split()), self._desk.world
+        if world is not None and name != world.name:
+            await self._desk.change(partial(rename, name=name[:_LONGEST]), f"It is called {name} now.")
+        self._shown_name = None  # the input shows what is, not what was refused
 
     def _fit(self) -> None:
         if self._desk.world is not None:

@@ -22,6 +22,11 @@ LEAP_M = 0.5
 _START = Pose2D(0.0, 0.0, 0.0)
 
 SCAN_POINTS = 180
+
+ARC_S, ARC_POINTS = 1.0, 10
+"""Time of the drawn arc in seconds, and its number of points."""
+_DRIVES_MPS = 0.02
+
 """Longer scans are subsampled."""
 
 Point = tuple[float, float]
@@ -79,6 +84,8 @@ class WorldState:
         description: The robot's URDF; empty until it is known.
         trail: The robot's path while the page was viewed.
         scan: Points of the laser scan in the world.
+        arc: Points in the world that the robot will pass in the next second, if it follows its command; none if it
+            stands.
     """
 
     robot: Pose2D = _START
@@ -87,6 +94,23 @@ class WorldState:
     description: str = ""
     trail: Trail = Trail()
     scan: tuple[Point, ...] = ()
+    arc: tuple[Point, ...] = ()
+
+
+def arc_points(command: Velocity, robot: Pose2D) -> tuple[Point, ...]:
+    """Return the points that ``robot``, its pose in the world, passes in the next second if it follows ``command``.
+
+    None if it is not to drive: a robot that turns in place passes none.
+    """
+    if abs(command.linear_mps) < _DRIVES_MPS:
+        return ()
+    times_s = np.linspace(0.0, ARC_S, ARC_POINTS + 1)[1:]
+    turns = command.angular_radps * times_s
+    # The chord of an arc: its length is that of the way times sin(x) / x, with x half of the turn.
+    chords = command.linear_mps * times_s * np.sinc(turns / math.tau)
+    angles = robot.yaw + turns / 2
+    points = np.stack([robot.x + chords * np.cos(angles), robot.y + chords * np.sin(angles)], axis=1)
+    return tuple((x, y) for x, y in points.round(2).tolist())
 
 
 def scan_points(scan: LaserScan, robot: Pose2D) -> tuple[Point, ...]:

@@ -195,7 +195,7 @@ class GraphRecorder(Recorder):
     """
 
     def __init__(self, path: Path, transport: Transport, clock: Clock, config: Config) -> None:
-        scans = (SCAN,) if config.collision_monitor.enabled else ()
+        scans = (SCAN,) if config.uses_scans else ()
         topics = (*RECORDED, cmd_vel(cmd_vel_type(config)), *scans)
         super().__init__(path, transport, clock, topics, describe(None, clock, ()))
         self._decides_s: float | None = time.monotonic() + _DECIDES_AFTER_S

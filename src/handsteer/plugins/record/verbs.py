@@ -44,7 +44,7 @@ def record(
         ROS arguments. ROS 1: topic:=other, __name:=name, __ns:=namespace.
         ROS 2: --ros-args -r topic:=other -r __ns:=/namespace.
     config_file
-        YAML file with parameters, of which cmd_vel_type and collision_monitor matter; options override it.
+        YAML file with parameters, of which cmd_vel_type and control.assist matter; options override it.
     """
     from handsteer.plugins.record.recorder import GraphRecorder
     from handsteer.transports import join

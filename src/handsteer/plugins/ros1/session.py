@@ -5,12 +5,13 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
-from handsteer.errors import TransportError
-from handsteer.transports.base import Session
+from handsteer.errors import HandsteerError, TransportError
+from handsteer.transports.base import Call, Session
 
 try:
     import rosgraph
@@ -25,6 +26,8 @@ from handsteer.plugins.ros1 import course
 from handsteer.plugins.ros1.master import Lifeline, Master, MasterGone
 from handsteer.plugins.ros1.topics import Ros1Transport
 from handsteer.transports.timing import ClockMonitor
+
+log = logging.getLogger(__name__)
 
 # The end of the master is detected at once; this finds a lost machine, and costs as much as a hundred signs a minute.
 _PING_PERIOD_S = 2.0
@@ -72,6 +75,16 @@ class Ros1Session(Session):
         self.transport = Ros1Transport(self.clock, translated.topics)
         self._watcher = threading.Thread(target=self._watch, name="ros1_session", daemon=True)
         self._watcher.start()
+
+    def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
+        """Offer the node's services, as std_srvs/Trigger, if this ROS has that package."""
+        try:
+            from std_srvs.srv import Trigger  # noqa: PLC0415 - it may be missing
+        except ImportError:
+            log.info("the node's services are left out: this ROS lacks the package std_srvs")
+            return
+        for name, call in services().items():
+            rospy.Service(f"~{name}", Trigger, partial(_answer, call))
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether ROS has asked this process to end (`rosnode kill`).
@@ -153,3 +166,11 @@ def _initialise(node: str, arguments: Sequence[str]) -> None:
     # As with any ROS node, the log goes to the screen, to the log file and to /rosout.
     ours = logging.getLogger("handsteer")
     ours.handlers = list(logging.getLogger("rosout").handlers)
+
+
+def _answer(call: Call, _request: Any) -> tuple[bool, str]:
+    """Return ``success`` and ``message`` of the response."""
+    try:
+        return True, call()
+    except HandsteerError as error:
+        return False, str(error)

@@ -97,10 +97,13 @@ class Ros1Transport(BaseTransport):
                 captured_s = capture_time(message, self._clock)
                 send(Received(message, captured_s, by_player=captured_s is not None and _is_player(theirs)))
 
-            if size > _SMALL_BUFFER_BYTES:
+            is_image = size > _SMALL_BUFFER_BYTES
+            if is_image:
                 keep_freed_memory()
+            # rospy would drop images of a bag, too; of a camera's, the node keeps the newest itself.
+            depth = None if is_image else topic.depth
             subscriber = rospy.Subscriber(
-                name, ros1_type(kind), on_message, queue_size=topic.depth, buff_size=size, tcp_nodelay=True
+                name, ros1_type(kind), on_message, queue_size=depth, buff_size=size, tcp_nodelay=True
             )
             return subscriber.unregister  # type: ignore[no-any-return]
 

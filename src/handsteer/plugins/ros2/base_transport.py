@@ -6,10 +6,12 @@ late messages are of no use to us. ``/clock`` is best effort.
 """
 
 import logging
+import math
+import re
 import threading
 import time
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
@@ -39,6 +41,8 @@ _SENSOR_DATA = (*IMAGES, CameraInfo, Odometry, JointState, LaserScan)
 # Enough to resend lost parts before the next image arrives; older images are of no use.
 _IMAGES_KEPT = 3
 _LAST_S = 0.2
+_PLAYER = re.compile(r"(/\w+)*/rosbag2_player\w*", re.ASCII)
+_PLAYERS_KNOWN_S = 0.25
 
 log = logging.getLogger(__name__)
 
@@ -172,7 +176,8 @@ class Ros2Transport(BaseTransport):
 
     def _reception(self, node: str, name: str, topic: Topic[M]) -> Receive[M]:
         compile_type(type_name(topic.type))
-        return lambda send: self._open_reader(name, topic, Intake(topic, name, self._clock, send).take)
+        players = Players(lambda: self.publishers_of(topic)) if topic.type in IMAGES else None
+        return lambda send: self._open_reader(name, topic, Intake(topic, name, self._clock, send, players).take)
 
     @abstractmethod
     def _open_writer(self, name: str, topic: Topic[Any]) -> Writer | None:
@@ -249,13 +254,41 @@ Take = Callable[[bytes, bytes, float | None], None]
 """Takes an encoded message, an identifier of its sender, and the time of sending, as :meth:`Intake.take`."""
 
 
+def are_players(nodes: Sequence[str]) -> bool:
+    """Return whether these nodes, by their full names, are players of recordings: ``ros2 bag play``."""
+    return bool(nodes) and all(_PLAYER.fullmatch(node) for node in nodes)
+
+
+class Players:
+    """Whether only players of recordings publish a topic, looked up a few times a second at most.
+
+    Args:
+        publishers: Returns the full names of the nodes that publish it.
+    """
+
+    def __init__(self, publishers: Callable[[], Sequence[str]]) -> None:
+        self._publishers = publishers
+        self._looked_s = -math.inf
+        self._are_alone = False
+
+    def are_alone(self) -> bool:
+        """Return whether no other node publishes it."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s >= _PLAYERS_KNOWN_S:
+            self._looked_s, self._are_alone = now_s, are_players(self._publishers())
+        return self._are_alone
+
+
 class Intake(Generic[M]):
     """Decodes the messages of a topic and sends them on, except late ones that do not stop the robot.
 
     The first invalid message is logged, and the first of several late ones.
     """
 
-    def __init__(self, topic: Topic[M], name: str, clock: Clock, send: Deliver[M]) -> None:
+    def __init__(
+        self, topic: Topic[M], name: str, clock: Clock, send: Deliver[M], players: Players | None = None
+    ) -> None:
+        self._players = players
         self._topic = topic
         self._name = name
         self._clock = clock
@@ -281,7 +314,9 @@ class Intake(Generic[M]):
             self._is_broken = True
             return
         if not is_late or (self._topic.stops is not None and self._topic.stops(message)):
-            self._send(Received(message, capture_time(message, self._clock), is_late=is_late))
+            captured_s = capture_time(message, self._clock)
+            is_played = captured_s is not None and self._players is not None and self._players.are_alone()
+            self._send(Received(message, captured_s, is_late=is_late, by_player=is_played))
 
     def _is_late(self, sender: bytes, sent_s: float | None) -> bool:
         if self._stale is None or sent_s is None:

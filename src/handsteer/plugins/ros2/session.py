@@ -13,6 +13,8 @@ from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 from rclpy.exceptions import NameValidationException
 from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.lifecycle.node import LifecycleNodeMixin
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
@@ -26,7 +28,7 @@ from handsteer.parameters import Description, NodeParameters, Value
 from handsteer.plugins.ros2.arguments import nested
 from handsteer.plugins.ros2.parameter_services import TYPES, descriptor
 from handsteer.plugins.ros2.topics import RclpyTransport, ros_class
-from handsteer.transports.base import Call, Session
+from handsteer.transports.base import Call, Managed, Session
 from handsteer.transports.encoding import encode
 from handsteer.transports.timing import ClockMonitor
 
@@ -36,7 +38,8 @@ _AFTER_FAILURE_S = 0.05
 _ANY_JUMP = JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1))
 _TRIGGER = "std_srvs/srv/Trigger"
 _QOS = "qos_overrides."
-_OF_ROS = ("use_sim_time", "start_type_description_service")
+_AUTOSTART = "autostart"
+_OF_ROS = ("use_sim_time", "start_type_description_service", _AUTOSTART)
 _SCALARS = (Parameter.Type.BOOL, Parameter.Type.INTEGER, Parameter.Type.DOUBLE)
 _SWITCH = {True: "on", False: "off"}
 _ARRAYS = tuple(kind for kind in Parameter.Type if kind.name.endswith("_ARRAY"))
@@ -121,6 +124,23 @@ class RclpySession(Session):
         """Let rclpy serve ``ros2 param``."""
         self._parameters = ParameterLink(self._node, parameters)
 
+    def manage(self, node: Managed) -> None:
+        """Make this a managed node of ROS 2; it activates itself, unless the parameter ``autostart`` is false.
+
+        Raises:
+            TransportError: The parameter is not a boolean.
+        """
+        if not self._node.has_parameter(_AUTOSTART):
+            self._node.declare_parameter(_AUTOSTART, True)
+        starts = self._node.get_parameter(_AUTOSTART).value
+        if not isinstance(starts, bool):
+            raise TransportError(f"ROS parameter {_AUTOSTART}: {starts!r} should be true or false")
+        node.is_active = starts
+        self._node.manage(node)
+        if starts:
+            self._node.trigger_configure()
+            self._node.trigger_activate()
+
     def offer(self, services: Callable[[], Mapping[str, Call]]) -> None:
         """Offer the node's services, as std_srvs/Trigger, if this ROS 2 has that package."""
         trigger = ros_class(_TRIGGER)
@@ -182,7 +202,38 @@ def _answer(call: Call, _request: Any, reply: Any) -> Any:
     return reply
 
 
-def _make_node(context: Any, node: str, arguments: Sequence[str]) -> Node:
+class LateManagedNode(LifecycleNodeMixin, Node):  # type: ignore[misc]
+    """A node of rclpy that becomes a managed one only by :meth:`manage`, after its parameters are known."""
+
+    def __init__(self, name: str, **options: Any) -> None:
+        Node.__init__(self, name, **options)
+        self._managed: Managed | None = None
+
+    def manage(self, node: Managed) -> None:
+        """Offer the services of ``ros2 lifecycle``, which activate and deactivate ``node``."""
+        self._managed = node
+        LifecycleNodeMixin.__init__(self)
+        self._wake_executor()
+
+    def on_activate(self, state: Any) -> Any:
+        """Activate the node."""
+        return self._set_active(True)
+
+    def on_deactivate(self, state: Any) -> Any:
+        """Deactivate the node, which has sent its last when this returns."""
+        return self._set_active(False)
+
+    def on_shutdown(self, state: Any) -> Any:
+        """Deactivate the node for good; its process goes on until it is ended."""
+        return self._set_active(False)
+
+    def _set_active(self, is_active: bool) -> Any:
+        assert self._managed is not None
+        done = self._managed.set_active(is_active)
+        return TransitionCallbackReturn.SUCCESS if done else TransitionCallbackReturn.FAILURE
+
+
+def _make_node(context: Any, node: str, arguments: Sequence[str]) -> LateManagedNode:
     try:
         # Our handlers process the signals: the robot must be stopped before the middleware shuts down.
         rclpy.init(args=list(arguments), context=context, signal_handler_options=SignalHandlerOptions.NO)
@@ -192,7 +243,7 @@ def _make_node(context: Any, node: str, arguments: Sequence[str]) -> Node:
                 f"{left_over[0]!r} is not a valid argument of ROS 2: it should be as --ros-args "
                 "-r image_raw:=camera/image -p fps:=15"
             )
-        return rclpy.create_node(
+        return LateManagedNode(
             node,
             context=context,
             start_parameter_services=False,

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from rclpy.clock import Clock as RosClock
+from rclpy.clock import ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import InvalidTopicNameException
@@ -16,7 +18,10 @@ from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverriding
 from handsteer.clock import Clock
 from handsteer.errors import TransportError
 from handsteer.messages import Topic, type_name
-from handsteer.plugins.ros2.base_transport import Profile, Ros2Transport, Take, offered, requested
+from handsteer.plugins.ros2.base_transport import IMAGES, Profile, Ros2Transport, Take, are_players, offered, requested
+
+_LOOK_S = 0.25
+_PLAYED_KEPT = 200
 
 log = logging.getLogger(__name__)
 
@@ -103,15 +108,20 @@ class RclpyTransport(Ros2Transport):
             sent_ns = info.get("source_timestamp", 0)  # not provided by every middleware
             take(raw, b"", sent_ns / 1e9 if sent_ns > 0 else None)
 
-        with _refusals(name):
-            subscription = self._node.create_subscription(
-                kind,
-                self._unresolved(topic),
-                on_message,
-                subscription_qos(topic),
-                qos_overriding_options=self._overriding(name),
-                raw=True,
-            )
+        def open_(on_message: Callable[[bytes, Mapping[str, int]], None], qos: QoSProfile) -> Any:
+            with _refusals(name):
+                return self._node.create_subscription(
+                    kind,
+                    self._unresolved(topic),
+                    on_message,
+                    qos,
+                    qos_overriding_options=self._overriding(name),
+                    raw=True,
+                )
+
+        if topic.type in IMAGES:
+            return _Images(self._node, self._unresolved(topic), subscription_qos(topic), open_, on_message).close
+        subscription = open_(on_message, subscription_qos(topic))
         return lambda: self._node.destroy_subscription(subscription)
 
     def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
@@ -143,6 +153,56 @@ class RclpyTransport(Ros2Transport):
                 package.replace("_", "-"),
             )
         return found
+
+
+class _Images:
+    """A subscription to images: the newest of a camera, but all of a player of bags, by a second subscription.
+
+    Args:
+        node: The node of rclpy, on whose thread everything is called.
+        name: The topic, as rclpy is asked for it.
+        qos: For the images of a camera.
+        open_: Opens a subscription with a callback and a profile.
+        on_message: Gets each image once.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        name: str,
+        qos: QoSProfile,
+        open_: Callable[[Callable[[bytes, Mapping[str, int]], None], QoSProfile], Any],
+        on_message: Callable[[bytes, Mapping[str, int]], None],
+    ) -> None:
+        self._node, self._name, self._open, self._on_message = node, name, open_, on_message
+        self._played: Any = None
+        self._qos_of_played: QoSProfile | None = None
+        self._live = open_(self._on_live, qos)
+        # By a clock of its own: /clock may stand still.
+        self._timer = node.create_timer(_LOOK_S, self._look, clock=RosClock(clock_type=ClockType.STEADY_TIME))
+
+    def close(self) -> None:
+        self._node.destroy_timer(self._timer)
+        for subscription in filter(None, (self._live, self._played)):
+            self._node.destroy_subscription(subscription)
+
+    def _on_live(self, raw: bytes, info: Mapping[str, int]) -> None:
+        if self._played is None:
+            self._on_message(raw, info)
+
+    def _look(self) -> None:
+        found = self._node.get_publishers_info_by_topic(self._name)
+        is_played = are_players([f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found])
+        if not found:
+            return  # the last images of a player that has ended may still wait
+        are_reliable = all(one.qos_profile.reliability is ReliabilityPolicy.RELIABLE for one in found)
+        wanted = _qos(Profile(are_reliable, latched=False, depth=_PLAYED_KEPT)) if is_played else None
+        if wanted == self._qos_of_played:
+            return
+        if self._played is not None:
+            self._node.destroy_subscription(self._played)
+        self._qos_of_played = wanted
+        self._played = None if wanted is None else self._open(self._on_message, wanted)
 
 
 class _Writer:

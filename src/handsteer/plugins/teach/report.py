@@ -17,7 +17,8 @@ _LEAST_ROWS: Final = 10
 _KNOWN_SHARE: Final = 0.3
 _CONFUSED_SHARE: Final = 0.2
 
-_FOLDS: Final = 3
+FOLDS: Final = 3
+"""Maximum number of folds of :func:`split`."""
 
 
 def custom_labels(dataset: Dataset, sided: Sequence[str]) -> tuple[str, ...]:
@@ -149,7 +150,7 @@ def split(dataset: Dataset, labels: Sequence[str]) -> tuple[str, list[Fold]]:
 
 def _folds(dataset: Dataset, labels: Sequence[str], group_of: Mapping[Take, Hashable]) -> list[Fold]:
     groups = list(dict.fromkeys(group_of[take] for take in dataset.takes if take.label in labels))
-    count = min(_FOLDS, len(groups))
+    count = min(FOLDS, len(groups))
     folds = []
     for number in range(count):
         out = set(groups[number::count])
@@ -171,14 +172,20 @@ class CustomSignFigures:
         summary: The amount of its data.
         sided: Whether its mirror image is not the same sign.
         threshold: Likelihood threshold.
-        recall: Of the held-out rows, how many were right; None if it could not be held out, because only one person
-            showed it and others showed other signs.
+        recall: Of the held-out rows, two for each hand unless it is sided, how many were right; None if it could not be
+            held out, because only one person showed it and others showed other signs.
     """
 
     summary: LabelSummary
     sided: bool
     threshold: float
     recall: Share | None
+
+    @property
+    def hands_tried(self) -> int:
+        """Number of held-out hands, each counted once."""
+        rows = self.recall.of if self.recall is not None else 0
+        return rows if self.sided else rows // 2
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain values, for JSON."""
@@ -195,7 +202,7 @@ class Mistake:
         hand: Index of one of these hands in the take.
         shown: The sign of the take.
         seen: The recognised sign.
-        hands: How many of the take's hands; each counts once as shown, and once mirrored unless the sign is sided.
+        hands: How many of the take's hands: as shown or mirrored.
     """
 
     take: int
@@ -241,7 +248,8 @@ class TrainingReport:
 
 def how_it_was_tried(report: TrainingReport) -> str:
     """Return how the figures were measured, without a full stop."""
-    tried = f"Recognition of held-out hands, one {report.held_out} at a time"
+    both = "" if all(sign.sided for sign in report.signs) else ", each as it is and mirrored"
+    tried = f"Recognition of held-out hands{both}, one {report.held_out} at a time"
     return tried if report.held_out == "person" else f"{tried}; not yet tested on other persons"
 
 

@@ -1,7 +1,6 @@
 """Trains a model of taught signs, and measures how well it distinguishes them from all other hands."""
 
 import itertools
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import asdict, dataclass
 from typing import Any, Final
@@ -17,6 +16,7 @@ from handsteer.plugins.teach.evaluation.intervals import Share
 from handsteer.plugins.teach.evaluation.photo_metrics import Confusion
 from handsteer.plugins.teach.network import learn_novelty, train
 from handsteer.plugins.teach.report import (
+    FOLDS,
     CustomSignFigures,
     Fold,
     LeftOut,
@@ -41,7 +41,7 @@ _HIDDEN: Final = (64, 32)
 _EPOCHS: Final = 8
 _OF_EACH: Final = 6_000
 _MADE: Final = 50_000
-"""Synthetic hands of all shapes to generate; about four of five have an unambiguous shape and are used."""
+"""Synthetic hands of all shapes to generate; about seven of ten have an unambiguous shape and are used."""
 _LEAST_RECALL: Final = 0.975
 _THRESHOLDS: Final = (0.7, 0.98)
 _LIMIT_MARGIN: Final = 1.2
@@ -63,6 +63,11 @@ class _Tried:
     chances: Array
     takes: tuple[Take, ...]
     hands: NDArray[np.int64]
+
+
+def training_rows(signs: int) -> int:
+    """Return how many rows a training of ``signs`` signs passes over at most, in all epochs and folds."""
+    return (FOLDS + 1) * _EPOCHS * (signs * _OF_EACH + _MADE)
 
 
 def train_signs(
@@ -274,9 +279,8 @@ def _mistakes(
     for take, hand, seen in zip(tried.takes, tried.hands.tolist(), _seen(tried, thresholds, labels), strict=True):
         if seen != take.label:
             rows.setdefault((take, seen), []).append(hand)
-    total = Counter(tried.takes)
     found = (
-        Mistake(numbers[take], hands[len(hands) // 2], take.label, seen, Share(len(hands), total[take]))
+        Mistake(numbers[take], hands[len(hands) // 2], take.label, seen, Share(len(set(hands)), len(take.hands)))
         for (take, seen), hands in rows.items()
     )
     return sorted(found, key=lambda each: -(each.hands.rate or 0.0))

@@ -66,8 +66,8 @@ if (localStorage.getItem("handsteer-details") === "true") {
   showDetails(true);
   window.addEventListener("load", () => showDetails(true)); // the button is there
 }
-// data-demo and data-coach on the root show what is new to this browser.
-for (const name of ["demo", "coach"]) {
+// data-demo, data-coach and data-better on the root show what is new to this browser.
+for (const name of ["demo", "coach", "better"]) {
   if (!localStorage.getItem(`handsteer-${name}`)) document.documentElement.dataset[name] = "new";
 }
 function noteSeen(name, shownMs = 0) {

@@ -8,7 +8,7 @@ let sent = Promise.resolve(); // once the last picture is sent
 
 onmessage = ({ data }) => {
   if (data.address) connect(data.address);
-  else if (data.changed) sent = sent.finally(() => post("changed"));
+  else if (data.words) sent = sent.finally(() => post(data.words));
   else sent = send(data.picture, data.capturedMs);
 };
 
@@ -18,7 +18,8 @@ function post(message) {
 
 function connect(address) {
   socket = new WebSocket(address);
-  socket.onopen = socket.onmessage = () => postMessage({});
+  socket.onopen = () => postMessage({});
+  socket.onmessage = () => postMessage({ hasArrived: true });
   socket.onclose = ({ code, reason }) => postMessage({
     closed: code === 1000 ? "" : reason || "the connection was lost",
     isRefused: code === 1000 || code >= 4400,

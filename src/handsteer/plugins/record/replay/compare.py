@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from handsteer.messages import CMD_VEL, GESTURE_JOY, HAND_SIGN, stick_in, twist_in, type_name
+from handsteer.messages import CMD_VEL, GESTURE_JOY, HAND_SIGN, pointing_in, stick_in, twist_in, type_name
 from handsteer.plugins.record.recorded import Recorded
 from handsteer.plugins.record.replay.rerun import CONTROL, Result
 from handsteer.transports.encoding import decode
@@ -65,9 +65,9 @@ def compare(results: Iterable[Result], comparison: Comparison, began_s: float) -
             comparison.frames, frame = comparison.frames + 1, result.frame
         comparison.signs += len(result.recorded.get(HAND_SIGN.name, ()))
         comparison.commands += sum(len(raws) for raws in result.recorded.values()) if result.node == CONTROL else 0
-        if result.differs:
+        for moment in _moments(result, began_s) if result.differs else ():
             comparison.differing += 1
-            yield from _moments(result, began_s)
+            yield moment
 
 
 def differing_software(about: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
@@ -110,6 +110,9 @@ def _in_words(topic: str, raw: bytes, kind: str) -> str:
         return str(message.data)
     if topic == GESTURE_JOY.name:
         stick = stick_in(message)
+        points = pointing_in(message)
+        if points.held and not stick.held:
+            return f"points {points.forward:+.3f} forward, {points.left:+.3f} left"
         return f"{stick.forward:+.3f} forward, {stick.left:+.3f} left" if stick.held else "released"
     velocity = twist_in(message)
     return f"{velocity.linear.x:.3f} m/s, {velocity.angular.z:.3f} rad/s"

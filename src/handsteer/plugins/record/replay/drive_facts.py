@@ -128,7 +128,7 @@ class Lap:
     """A try at the world's course.
 
     Attributes:
-        began_s: When the start gate was crossed, in seconds since the recording began.
+        began_s: When the start gate was crossed, in seconds since the recording began; negative if that was before.
         course: The progress at its end.
     """
 
@@ -187,7 +187,7 @@ class DriveFacts:
         camera: Name of the camera.
         size: Width and height of a frame in pixels.
         robot: Kind of the robot.
-        world: Name of the world, at the start.
+        worlds: Names of the worlds that it drove in, in their order; only the first 100.
         frames: Number of frames.
         commands: Number of commands.
         signs: Totals per confirmed sign.
@@ -223,7 +223,7 @@ class DriveFacts:
     camera: str = ""
     size: tuple[int, int] | None = None
     robot: str = ""
-    world: str = ""
+    worlds: list[str] = field(default_factory=list)
     frames: int = 0
     commands: int = 0
     signs: dict[str, SignTotal] = field(default_factory=dict)
@@ -270,7 +270,7 @@ class DriveFacts:
             "handsteer": self.about.get("handsteer"),
             "camera": self.camera or None,
             "robot": self.robot or None,
-            "world": self.world or None,
+            "world": ", then ".join(self.worlds) or None,
             "frames": self.frames,
             "frames_per_s": round(self.frames_per_s, 2),
             "signs": {name: _rounded(asdict(total)) for name, total in self.signs.items()},

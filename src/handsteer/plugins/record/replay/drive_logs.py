@@ -21,6 +21,8 @@ _SIGN_HOLDS_S = 0.35
 _LARGEST = 1e6
 _MOST_LAPS, _MOST_BUMPS, _MOST_LEAPS = 1000, 1000, 1000
 _LEAP_M = 0.5
+# Statuses come ten times a second, and later under load.
+_STATUS_S = 0.5
 # A robot at rest measures a little.
 _STANDS_MPS, _STANDS_RADPS = 0.01, 0.02
 _LONGEST_STEP_S = 0.5
@@ -173,9 +175,12 @@ class RobotLog:
         if course.phase == "ready":
             return
         laps = self._facts.laps
+        if before is None and course.phase == "finished":
+            return  # a lap before the recording
         is_new = before is None or before.phase == "ready" or course.next_gate < before.next_gate
         if is_new and len(laps) < _MOST_LAPS:
-            laps.append(Lap(max(0.0, time_s - course.time_s), course))
+            began_s = time_s - course.time_s
+            laps.append(Lap(began_s if began_s < -_STATUS_S else max(0.0, began_s), course))
         elif laps:
             laps[-1].course = course
 

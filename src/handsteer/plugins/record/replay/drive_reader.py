@@ -42,6 +42,7 @@ _MARKERS_PERIOD_S = 1.0
 _LONGEST_STATUS_S = 0.5
 _LARGEST = 1e6
 _MOST_EVENTS = 1000
+_MOST_WORLDS, _LONGEST_NAME = 100, 60
 _EPOCH_BEGINS_S = 1e9
 
 
@@ -253,6 +254,7 @@ class _Reader:
                 self._note_control(status, time_s)
             elif isinstance(status, RobotStatus):
                 self._robot.note_status(time_s, status)
+                self._note_world(status.world)
 
     def _note_trouble(self, recorded: Recorded, status: Status) -> None:
         if status.level != OK:
@@ -266,13 +268,18 @@ class _Reader:
             sources = self._facts.sources
             sources[status.source] = sources.get(status.source, 0.0) + min(time_s - before_s, _LONGEST_STATUS_S)
 
+    def _note_world(self, name: str) -> None:
+        worlds, name = self._facts.worlds, name[:_LONGEST_NAME]
+        if name and worlds[-1:] != [name] and len(worlds) < _MOST_WORLDS:
+            worlds.append(name)
+
     def _describe(self) -> None:
         """Fill in what the metadata contains."""
         facts = self._facts
         facts.began = _moment(facts.about.get("began", ""), self._began_s)
-        facts.robot, facts.world = (_parameter(facts.about, "robot", name) for name in ("kind", "world"))
-        if facts.robot != "sim":
-            facts.world = ""
+        facts.robot = _parameter(facts.about, "robot", "kind")
+        if not facts.worlds and facts.robot == "sim":  # an older recording
+            facts.worlds = [_parameter(facts.about, "robot", "world")]
         if not facts.camera:
             facts.camera = _parameter(facts.about, "camera", "source").rstrip("/").rpartition("/")[2]
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import Final, Literal
 
 from handsteer.config import ControlConfig, JoyConfig
-from handsteer.messages import Joy, stick_in
+from handsteer.messages import Joy, pointing_in, stick_in
 from handsteer.nodes.status import ControlStatus
 from handsteer.plugins.record.replay.drive_facts import DriveFacts, Unexplained
 from handsteer.timeouts import ROBOT_S
@@ -37,7 +37,11 @@ _SOURCES: Final[Mapping[Input, str]] = {
     "steering": "steering",
     "gamepad": "steering",
 }
-_MODES: Final[Mapping[Input, str]] = {"signs": "signs", "joystick": "joystick", "gamepad": "joystick"}
+_MODES: Final[Mapping[Input, tuple[str, ...]]] = {
+    "signs": ("signs",),
+    "joystick": ("joystick", "point"),
+    "gamepad": ("joystick",),
+}
 
 Span = tuple[float, float]
 
@@ -79,7 +83,7 @@ class ReasonLog:
         self._facts = facts
         self._gamepad = (gamepad or JoyConfig()).model_dump()
         self._rule = rule or ControlConfig()
-        self._mode: str | None = rule.mode if rule else None
+        self._mode: str | None = _mode_of(rule) if rule else None
         self._moves: dict[str, Level] = {}
         self._inputs: dict[Input, Level] = {name: Level() for name in _SOURCES}
         self._said: dict[str, Level] = {}
@@ -88,7 +92,7 @@ class ReasonLog:
 
     def note_rule(self, rule: ControlConfig) -> None:
         """Note the parameters from now on."""
-        self._rule, self._mode = rule, rule.mode
+        self._rule, self._mode = rule, _mode_of(rule)
 
     def note_sign(self, time_s: float, sign: str) -> None:
         """Note a confirmed sign: any but those that stop may keep a robot in motion."""
@@ -99,8 +103,9 @@ class ReasonLog:
         self._note("steering", time_s, self._rule.steering_timeout, on=wanted.is_finite and not wanted.is_zero)
 
     def note_joystick(self, time_s: float, message: Joy) -> None:
-        """Note the state of the hand as a joystick."""
-        self._note("joystick", time_s, self._rule.sign_timeout, on=stick_in(message).held)
+        """Note the state of the hand as a joystick, or where it points."""
+        stick = (pointing_in if self._rule.points else stick_in)(message)
+        self._note("joystick", time_s, self._rule.sign_timeout, on=stick.held)
 
     def note_gamepad(self, time_s: float, message: Joy) -> None:
         """Note the state of a gamepad."""
@@ -140,7 +145,7 @@ class ReasonLog:
         self._facts.unexplained = [Unexplained(begin, end, why) for (begin, end), why in listed]
 
     def _note(self, name: Input, time_s: float, holds_s: float, *, on: bool) -> None:
-        on = on and self._mode in (None, _MODES.get(name, self._mode))
+        on = on and (self._mode is None or self._mode in _MODES.get(name, (self._mode,)))
         self._inputs[name].note(time_s, on=on, holds_s=holds_s)
 
     def _unsaid(self, moved: list[Span], live: list[Span], inputs: Mapping[Input, list[Span]]) -> list[Span]:
@@ -152,6 +157,10 @@ class ReasonLog:
         begin_s, end_s = self._watched
         watched = common(common(moved, live), [(begin_s, end_s)])
         return [(begin, end) for begin, end in less(watched, named) if end - begin > _SHORTEST_S]
+
+
+def _mode_of(rule: ControlConfig) -> str:
+    return "point" if rule.points else rule.mode
 
 
 def union(spans: Iterable[Span]) -> list[Span]:

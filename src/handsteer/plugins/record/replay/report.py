@@ -15,7 +15,7 @@ from typing import Any
 
 from handsteer.errors import RecordingError, needing
 from handsteer.plugins.record.files import open_recording
-from handsteer.plugins.record.replay.drive_facts import DriveFacts, Stand
+from handsteer.plugins.record.replay.drive_facts import DriveFacts, Lap, Stand
 from handsteer.plugins.record.replay.drive_reader import read_drive
 from handsteer.plugins.record.replay.report_charts import drive_map, latencies, timeline
 from handsteer.plugins.record.replay.report_words import Total, heading, sign_totals, totals
@@ -71,7 +71,7 @@ def _page(facts: DriveFacts) -> str:
         {name: chart for name, chart in charts.items() if chart}, separators=(",", ":"), allow_nan=False
     )
     policy = (
-        f"default-src 'none'; script-src {_hash(plotly)} {_hash(script)}; "
+        f"default-src 'none'; script-src {script_hash(plotly)} {script_hash(script)}; "
         "style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
     parts = [
@@ -105,7 +105,7 @@ def _page(facts: DriveFacts) -> str:
 <p>{_text(heading(facts))}</p>
 {"".join(parts)}
 </main>
-<script type="application/json" id="figures">{_inert(figures)}</script>
+<script type="application/json" id="figures">{inert(figures)}</script>
 <script>{plotly}</script>
 <script>{script}</script>
 </body>
@@ -150,7 +150,7 @@ def _laps(facts: DriveFacts) -> str:
     if not facts.laps:
         return ""
     rows = "".join(
-        f"<tr><td>{number}</td><td>{lap.began_s:.1f} s</td><td>{lap.course.passed}/{lap.course.gates}</td>"
+        f"<tr><td>{number}</td><td>{_lap_began(lap)}</td><td>{lap.course.passed}/{lap.course.gates}</td>"
         f"<td>{len(lap.course.missed)}</td><td>{lap.course.bumps}</td><td>{stopwatch(lap.course.time_s)}</td>"
         f"<td>{f'{lap.course.score_s:.1f} s' if lap.course.phase == 'finished' else 'not finished'}</td></tr>"
         for number, lap in enumerate(facts.laps, 1)
@@ -158,6 +158,10 @@ def _laps(facts: DriveFacts) -> str:
     names = ("lap", "began at", "gates", "missed", "bumps", "time", "score")
     head = "".join(f"<th>{name}</th>" for name in names)
     return f'<section><h2>Laps</h2><div class="wide"><table><tr>{head}</tr>{rows}</table></div></section>'
+
+
+def _lap_began(lap: Lap) -> str:
+    return f"{lap.began_s:.1f} s" if lap.began_s >= 0 else f"{-lap.began_s:.1f} s before the recording"
 
 
 def _stands(facts: DriveFacts) -> str:
@@ -223,8 +227,8 @@ def _text(text: str) -> str:
     return html.escape(text if len(text) <= _LONGEST else text[:_LONGEST] + "...")
 
 
-def _inert(text: str) -> str:
-    """Return JSON in which no HTML begins or ends."""
+def inert(text: str) -> str:
+    """Return the JSON ``text`` in a form in which no HTML begins or ends."""
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
@@ -232,5 +236,6 @@ def _static(name: str) -> str:
     return resources.files("handsteer.plugins.record.replay").joinpath("static", name).read_text(encoding="utf-8")
 
 
-def _hash(script: str) -> str:
+def script_hash(script: str) -> str:
+    """Return the source by which a Content-Security-Policy permits ``script``."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"

@@ -30,7 +30,7 @@ def totals(facts: DriveFacts) -> list[Total]:
         Total("duration", _time(facts.duration_s)),
         Total("camera", facts.camera or "unknown", _size(facts)) if facts.camera or facts.size else None,
         Total("frames", str(facts.frames), f"{facts.frames_per_s:.1f} a second") if facts.frames else None,
-        Total("robot", facts.robot, f"world {facts.world}" if facts.world else "") if facts.robot else None,
+        Total("robot", facts.robot, _worlds(facts)) if facts.robot else None,
         None if facts.distance_m is None else Total("distance", f"{facts.distance_m:.2f} m"),
         _driving(facts),
         Total("driven by", ", ".join(facts.sources), _seconds(facts.sources)) if facts.sources else None,
@@ -105,7 +105,12 @@ def _gates(facts: DriveFacts) -> Total | None:
     if not facts.laps:
         return None
     last = facts.laps[-1]
-    return Total("laps", str(len(facts.laps)), f"the last: {last.course}")
+    before = f", begun {-last.began_s:.1f} s before the recording" if last.began_s < 0 else ""
+    return Total("laps", str(len(facts.laps)), f"the last: {last.course}{before}")
+
+
+def _worlds(facts: DriveFacts) -> str:
+    return f"world {', then '.join(facts.worlds)}" if facts.worlds else ""
 
 
 def _latency(facts: DriveFacts) -> Total | None:

@@ -1,0 +1,148 @@
+"""The velocity nearest to the wish whose path keeps clear: a pure function of wish, scan and the robot's velocity.
+
+This is the dynamic window (D. Fox, W. Burgard and S. Thrun, "The dynamic window approach to collision avoidance", IEEE
+Robotics & Automation Magazine 4, 1997) with a person instead of a goal: only what a robot can reach in half a second is
+considered, and it is judged by how near it is to the wish.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handsteer.control.assist import TURNS_RADPS, Around
+from handsteer.control.footprint import braking, fastest_mps, reach_m
+from handsteer.control.obstacles import Hit, met, steps_s
+from handsteer.types import Velocity
+
+CLEAR_S = 1.0
+"""For so long at least the path of what is chosen keeps clear, in seconds."""
+
+LOOK_S = 1.5
+"""It steers if the path of the wish meets something within this, in seconds: early enough for a bend at full speed."""
+
+REACH_S = 0.5
+"""What is chosen can be reached within this, in seconds, with the guaranteed decelerations."""
+
+WIDEST_RAD = math.radians(30)
+"""The place that is reached after :data:`CLEAR_S` lies at most this far to the side of that of the wish."""
+
+# A robot that turns at w has its way w * t / 2 to the side after t seconds.
+_WIDEST_RADPS = 2 * WIDEST_RAD / CLEAR_S
+
+PAD_M = 0.04
+"""Distance kept on all sides: more than that at which the collision monitor brakes, which grows with speed as well."""
+
+_PAD_S = 0.03
+# However slow it is, it looks so far ahead: a turn before a wall needs room for the corners of the robot.
+_LEAST_M = 0.6
+_LONGEST_S = 4.0
+# A way that is longer by less than this leads nowhere else.
+_LONGER_M = 0.03
+_DIRECTIONS = 8
+# Shares of the speed of the wish, and what each costs: a whole turn to the side costs 1.
+_SHARES = ((1.0, 0.0), (0.8, 0.7), (0.6, 1.4), (0.4, 2.1), (0.25, 2.6))
+# A side that the robot turns to already is kept.
+_OTHER_SIDE = 0.2
+
+
+class Steer:
+    """The :class:`~handsteer.doors.Assist` ``steer``."""
+
+    def step(self, wanted: Velocity, around: Around) -> tuple[Velocity, Hit | None]:
+        """Return :func:`steered`."""
+        return steered(wanted, around)
+
+
+def steered(wanted: Velocity, around: Around) -> tuple[Velocity, Hit | None]:
+    """Return the velocity to command instead of ``wanted``, and the obstacle that it avoids, or None.
+
+    It is ``wanted`` if its path keeps clear for :data:`LOOK_S` or 0.6 m, or if there is none around: then it is for
+    others to brake. A turn in place is left as it is.
+
+    Args:
+        wanted: What the person wants; finite.
+        around: The obstacles and the robot.
+    """
+    if not wanted.linear_mps or not len(around.points):
+        return wanted, None
+    way_m = max(LOOK_S * abs(wanted.linear_mps), _LEAST_M)
+    around = _near(wanted, way_m, around)
+    avoided = _hit(wanted, way_m, around)
+    if avoided is None:
+        return wanted, None
+    best, longest_m = None, _free_m(wanted, avoided, around) + _LONGER_M
+    for candidate in _candidates(wanted, around):
+        hit = _hit(candidate, way_m, around)
+        if hit is None:
+            return candidate, avoided
+        # Before a wall, nothing leads past it yet; but there is a side to which the way is longer.
+        free_m = _free_m(candidate, hit, around)
+        if hit.time_s >= CLEAR_S and free_m > longest_m:
+            best, longest_m = candidate, free_m
+    return (wanted, None) if best is None else (best, avoided)
+
+
+def _free_m(target: Velocity, hit: Hit, around: Around) -> float:
+    """Return the length of the way to ``hit``, roughly: that of a robot that is slowed is longer at first."""
+    faster_mps = max(0.0, abs(around.moving.linear_mps) - abs(target.linear_mps))
+    return abs(target.linear_mps) * hit.time_s + faster_mps**2 / (2 * around.rule.deceleration)
+
+
+def _near(wanted: Velocity, way_m: float, around: Around) -> Around:
+    """Return ``around`` with those points only that a path considered could come near to."""
+    fastest = Velocity(max(abs(wanted.linear_mps), abs(around.moving.linear_mps)), around.max_angular_radps)
+    reach, points = reach_m(around.rule), around.points
+    far_m = max(way_m, fastest.linear_mps * LOOK_S) + reach + PAD_M + _PAD_S * fastest_mps(fastest, around.rule)
+    x, y = points[:, 0] * math.copysign(1.0, wanted.linear_mps), points[:, 1]
+    return replace(around, points=points[(x * x + y * y <= far_m**2) & (x >= -reach - PAD_M)])
+
+
+def _hit(target: Velocity, way_m: float, around: Around) -> Hit | None:
+    """Return the first obstacle on the next ``way_m`` metres of a robot that changes its velocity to ``target``.
+
+    All are judged for as long a way: a slower path that only meets the same later is none around it.
+    """
+    moving, rule = around.moving, around.rule
+    fastest = max(fastest_mps(target, rule), fastest_mps(moving, rule))
+    if not len(around.points):
+        return None
+    clear_s = max(CLEAR_S, min(way_m / abs(target.linear_mps), _LONGEST_S))
+    times_s = steps_s(fastest, clear_s)
+    poses = braking(moving, target, rule, clear_s, times_s)
+    return met(poses, times_s, around.points, rule, pad_m=PAD_M + _PAD_S * fastest, fastest_mps=fastest)
+
+
+def _candidates(wanted: Velocity, around: Around) -> Iterator[Velocity]:
+    """Yield the velocities that may be chosen, the nearest to ``wanted`` first."""
+    turns, moving = _turns(wanted, around), around.moving
+    most = REACH_S * around.rule.deceleration
+    found: list[tuple[float, Velocity]] = []
+    seen: set[float] = set()
+    for share, cost in _SHARES:
+        wished = share * wanted.linear_mps
+        linear = max(moving.linear_mps - most, min(wished, moving.linear_mps + most))
+        if linear * wanted.linear_mps <= 0.0 or abs(linear) > abs(wished) or linear in seen:
+            continue  # it still rolls the other way, or cannot be as slow so soon
+        seen.add(linear)
+        for turn in turns:
+            off = abs(turn - wanted.angular_radps) / _WIDEST_RADPS
+            other = _OTHER_SIDE if turn * moving.angular_radps < 0 else 0.0
+            found.append((cost + off + other, Velocity(linear, float(turn))))
+    yield from (velocity for _, velocity in sorted(found, key=lambda each: each[0]))
+
+
+def _turns(wanted: Velocity, around: Around) -> NDArray[np.float64]:
+    """Return the turn rates that may be chosen, (K,): none, if what is wanted cannot be reached soon."""
+    middle, now, most = wanted.angular_radps, around.moving.angular_radps, around.max_angular_radps
+    reach = REACH_S * around.rule.angular_deceleration
+    low, high = max(middle - _WIDEST_RADPS, now - reach, -most), min(middle + _WIDEST_RADPS, now + reach, most)
+    if middle >= TURNS_RADPS:
+        low = max(low, 0.0)
+    elif middle <= -TURNS_RADPS:
+        high = min(high, 0.0)
+    if low > high:
+        return np.empty(0)
+    return np.unique([*np.linspace(low, high, _DIRECTIONS), max(low, min(middle, high))])
