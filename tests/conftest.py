@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -59,6 +60,16 @@ HANGS_S = 960.0
 """After so long, a process whose test hangs prints the stacks of its threads and ends; pytest-xdist says which test it
 was, and goes on with the others in another process. Longer than any timeout of pytest-timeout, which interrupts the
 function of a test, once: neither its fixtures, nor what the function does at its end."""
+
+UNTIL_S = {
+    "exhaustive": float(os.environ.get("HANDSTEER_EXHAUSTIVE_UNTIL_S", "inf")),
+    "slow": float(os.environ.get("HANDSTEER_SLOW_UNTIL_S", "inf")),
+}
+"""So long after the start of the tests, those with a marker are skipped: CI has to end on a slow machine too. What is
+exhaustive goes first: it tries every case of what others try once."""
+
+# Of the process that all others are started by.
+_STARTED_S = float(os.environ.setdefault("HANDSTEER_TESTS_STARTED_S", str(time.monotonic())))
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -118,7 +129,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     With ``--dist loadgroup``, one process runs the tests of a file, and one all that need a browser: without a graphics
     card, two that draw pages wait for each other. What takes longest comes first, so that no process is left with it
-    at the end: the group with browsers, then those with other slow tests.
+    at the end: the group with browsers, then those with other slow tests, then those in which all slow ones are
+    exhaustive. In a group, what is exhaustive comes last.
     """
     ranks: dict[str, int] = {}
     for item in items:
@@ -131,7 +143,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             reruns = 2 if item.get_closest_marker("browser") else 1  # drawn in software, next to other tests
             item.add_marker(pytest.mark.flaky(reruns=reruns, reruns_delay=3))
         ranks[_group(item)] = max(ranks.get(_group(item), 0), _rank(item))
-    items.sort(key=lambda item: -ranks[_group(item)])
+    items.sort(key=lambda item: (-ranks[_group(item)], _group(item), _is_exhaustive(item)))
 
 
 def _group(item: pytest.Item) -> str:
@@ -140,8 +152,14 @@ def _group(item: pytest.Item) -> str:
     return str(marker.args[0])
 
 
+def _is_exhaustive(item: pytest.Item) -> bool:
+    return item.get_closest_marker("exhaustive") is not None
+
+
 def _rank(item: pytest.Item) -> int:
-    return 2 if item.get_closest_marker("browser") else 1 if item.get_closest_marker("slow") else 0
+    if item.get_closest_marker("browser"):
+        return 3
+    return 0 if not item.get_closest_marker("slow") else 1 if _is_exhaustive(item) else 2
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
@@ -161,11 +179,14 @@ def _end_if_it_hangs(item: pytest.Item) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Begin each try of a test with all its time, and skip what needs ROS 1 where that is not installed."""
+    """Begin each try of a test with all its time, and skip what needs ROS 1, or time, where there is none."""
     _end_if_it_hangs(item)
     there = importlib.util.find_spec("rospy") and shutil.which("roscore")
     if item.get_closest_marker("ros1") and not there:
         pytest.skip("ROS 1 is not installed: make ros1")
+    for marker, until_s in UNTIL_S.items():
+        if item.get_closest_marker(marker) and time.monotonic() - _STARTED_S > until_s:
+            pytest.skip(f"left out, as it is {marker}: the tests have run for {until_s:g} s")
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

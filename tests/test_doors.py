@@ -19,13 +19,13 @@ from handsteer.config import Config
 from handsteer.errors import PluginError
 from handsteer.graph import Graph
 from handsteer.types import Velocity
+from tests.contracts.node_contract import VIRTUAL
 from tests.processes import START_S
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = (ROOT / "docs" / "plugins.md").read_text()
 MOST_LINES = 40
 FREE = ("--control.arming", "off", "--control.engage", "off", "--robot.odom-timeout", "10")
-VIRTUAL = ["--camera", "virtual", "--camera.width", "320", "--camera.height", "240"]
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
 
@@ -101,7 +101,7 @@ def forget() -> Any:
 
 
 @pytest.mark.parametrize(
-    "title", ["Camera", "Robot", "Transport", "Page", "Verb", "Action", "Classifier", "Parameters"]
+    "title", ["Camera", "Robot", "Transport", "Page", "Verb", "Action", "Assist", "Classifier", "Parameters"]
 )
 def test_an_example_is_short(title: str) -> None:
     assert len(example(title).splitlines()) <= MOST_LINES
@@ -150,6 +150,19 @@ def test_an_action_changes_the_velocity_within_the_limits(installed: Installed) 
     control = SignControl(config)
     assert control.step("Go", 0.03) == Velocity(0.04, 0.0)
     assert control.step("Stop", 0.03) == Velocity()
+
+
+def test_an_assist_is_chosen_by_its_name(installed: Installed) -> None:
+    import numpy as np  # noqa: PLC0415
+
+    from handsteer.control.assist import Around, assist_named, assisted  # noqa: PLC0415
+
+    installed.add("calming", example("Assist"), assists="calm = Calm")
+    calm, rule = assist_named("calm"), Config().collision_monitor
+    assert calm is not None
+    for x, linear_mps in ((0.9, 0.2), (1.1, 0.4)):
+        velocity, _ = assisted(calm, Velocity(0.4, 0.1), Around(np.array([(x, 0.0)]), Velocity(), rule, 2.0))
+        assert velocity == Velocity(linear_mps, 0.1)
 
 
 FAILING = """

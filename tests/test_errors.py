@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -65,11 +66,20 @@ def test_what_else_is_missing_is_no_matter_of_an_extra() -> None:
         import not_of_an_extra.part  # type: ignore[import-not-found]  # noqa: F401, PLC0415
 
 
-def test_the_command_to_install_an_extra_fits_this_installation(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_to_install_an_extra_fits_this_installation(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     assert re.fullmatch(rf"{sys.executable} -m pip install 'matplotlib[<>=.\d,]*'", install_command("plots"))
     assert "nicegui" in install_command("page")
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    assert install_command("plots").startswith(f"uv pip install --python {sys.executable} 'matplotlib")
+    python, own = tmp_path / "python", tmp_path / "uv"
+    monkeypatch.setattr("sys.executable", str(python))
+    monkeypatch.setenv("PATH", str(tmp_path / "empty"))
+    assert install_command("plots").startswith(f"{python} -m ensurepip && {python} -m pip install 'matplotlib")
+    own.touch(0o755)
+    assert install_command("plots").startswith(f"{own} pip install --python {python} 'matplotlib")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert install_command("plots").startswith(f"uv pip install --python {python} 'matplotlib")
     assert install_command("unknown") == "pip install 'handsteer[unknown]'"
 
 

@@ -1,5 +1,6 @@
 """The hand as a joystick through real pictures and landmark models: how soon it moves, and how soon it stops."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -31,12 +32,19 @@ class Person:
         self._background = make_background("cluttered", WIDTH, HEIGHT, 0)
 
     def picture(
-        self, pose: HandPose | None, forward_m: float = 0.0, left_m: float = 0.0, side: str = "Right"
+        self,
+        pose: HandPose | None,
+        forward_m: float = 0.0,
+        left_m: float = 0.0,
+        side: str = "Right",
+        roll_deg: float = 0.0,
     ) -> Picture:
         if pose is None:
             return self._background.copy()
         x, y, z = pose.view.position
-        view = View(pose.view.yaw, pose.view.pitch, pose.view.roll, (x + left_m, y - forward_m, z))
+        view = View(
+            pose.view.yaw, pose.view.pitch, pose.view.roll + math.radians(roll_deg), (x + left_m, y - forward_m, z)
+        )
         placement = view.placement("Left" if side == "Left" else "Right")
         camera = Pinhole.webcam(WIDTH, HEIGHT)
         return render(pose_skeleton(pose.angles), placement, camera, Look(), self._background)
@@ -109,3 +117,53 @@ def test_pictures_of_a_palm_and_a_fist_in_turn_do_not_engage() -> None:
             person.shows(picture, frames)
     assert person.teleop.reason == "disengaged: open, close and open your hand to begin"
     assert set(person.shows(person.picture(sign_pose("Forward")), 15)) == {ZERO}
+
+
+POINT = ControlConfig(rule="point", arming="off", engage="off")
+
+
+@pytest.mark.parametrize("roll_deg", [-30, 0, 30])
+def test_the_robot_drives_where_the_finger_points(roll_deg: float) -> None:
+    person = Person(POINT)
+    person.shows(person.picture(sign_pose(STOP)), 5)
+    finger = person.picture(sign_pose("Forward"), forward_m=0.05, roll_deg=roll_deg)
+    velocity = person.shows(finger, 40)[-1]
+    assert velocity.linear_mps > 0.3
+    # Clockwise in the picture, which is not mirrored, is to the person's left.
+    assert math.copysign(1.0, velocity.angular_radps) == math.copysign(1.0, roll_deg) or roll_deg == 0
+    assert (abs(velocity.angular_radps) > 0.25) == (roll_deg != 0)
+
+
+def test_a_higher_hand_that_points_drives_faster() -> None:
+    person = Person(POINT)
+    person.shows(person.picture(sign_pose(STOP)), 5)
+    speeds = [
+        person.shows(person.picture(sign_pose("Forward"), forward_m=height_m), 30)[-1].linear_mps
+        for height_m in (-0.06, 0.0, 0.06)
+    ]
+    assert speeds == sorted(speeds)
+    assert speeds[2] > 1.5 * speeds[0]
+
+
+@pytest.mark.parametrize("after", [STOP, None])
+def test_a_palm_or_no_hand_ends_pointing(after: str | None) -> None:
+    person = Person(POINT)
+    person.shows(person.picture(sign_pose(STOP)), 5)
+    person.shows(person.picture(sign_pose("Forward")), 40)
+    picture = person.picture(sign_pose(after) if after else None, forward_m=0.0)
+    assert person.shows(picture, 9)[-1] == ZERO
+
+
+def test_the_fist_keeps_the_speed_of_pointing() -> None:
+    person = Person(POINT)
+    person.shows(person.picture(sign_pose(STOP)), 5)
+    before = person.shows(person.picture(sign_pose("Forward")), 40)[-1]
+    kept = person.shows(person.picture(sign_pose(GO)), 20)[-1]
+    assert kept.linear_mps == pytest.approx(before.linear_mps, abs=0.1)
+    assert kept.angular_radps == 0.0
+
+
+def test_a_teleop_driven_by_signs_has_no_stick() -> None:
+    person = Person(ControlConfig(arming="off", engage="off"))
+    person.shows(person.picture(sign_pose("Forward")), 10)
+    assert not person.teleop.stick.held

@@ -1,5 +1,10 @@
+import contextlib
+import re
+import socket
 import struct
 import subprocess
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +113,39 @@ def test_a_device_that_gives_no_picture() -> None:
 def test_an_address_that_does_not_answer() -> None:
     with pytest.raises(CameraNotFound, match=r"no picture comes from rtsp://127\.0\.0\.1:9/x: check the address"):
         Webcam("rtsp://127.0.0.1:9/x", SteppedClock())
+
+
+@pytest.mark.slow
+def test_jpegs_that_a_program_sends_to_a_port_are_read_up_to_the_newest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the camera on the ribbon cable of a Raspberry Pi is used."""
+    guide = (Path(__file__).parents[2] / "docs" / "raspberry-pi.md").read_text(encoding="utf-8")
+    options = re.search(r'OPENCV_FFMPEG_CAPTURE_OPTIONS="(.+)"', guide)
+    assert options
+    monkeypatch.setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", options[1])
+    sent = 0
+
+    def send(server: socket.socket) -> None:
+        nonlocal sent
+        connection, _ = server.accept()
+        with connection, contextlib.suppress(OSError):  # its end
+            while True:
+                picture = np.full((480, 640, 3), 8 * (sent % 32), np.uint8)
+                connection.sendall(cv2.imencode(".jpg", picture)[1].tobytes())
+                sent += 1
+                time.sleep(1 / 30)
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        threading.Thread(target=send, args=(server,), daemon=True).start()
+        camera = Webcam(f"tcp://127.0.0.1:{server.getsockname()[1]}", SteppedClock())
+        for _ in range(1000):
+            frame = camera.read()
+            assert frame
+            shown = float(frame.image.mean()) / 8
+            if sent and abs(shown - (sent - 1) % 32) < 1.5:
+                break
+        else:
+            pytest.fail("the newest picture was not read")
+        camera.close()
 
 
 def test_a_camera_that_would_give_far_too_large_pictures_is_asked_for_none() -> None:

@@ -85,7 +85,7 @@ def test_parameters_are_listed_and_found(capsys: pytest.CaptureFixture[str]) -> 
 
 
 def test_parameters_are_options_of_every_form(capsys: pytest.CaptureFixture[str]) -> None:
-    rows = prints(capsys, "signs", "list", "--json", "--control.actions.Stop=stop", "--control.cruise_turn", "0.5")
+    rows = prints(capsys, "signs", "list", "--json", "--control.actions.Stop=stop", "--control.point_turn", "0.5")
     assert {"sign": "Stop", "action": "stop"}.items() <= next(
         row for row in json.loads(rows) if row["sign"] == "Stop"
     ).items()

@@ -14,7 +14,7 @@ from tests.processes import Peer, Process, eventually
 
 CMD_VEL = "/robot_diff_drive_controller/cmd_vel"
 ODOM = "/robot_diff_drive_controller/odom"
-FORWARD = ("--camera", "virtual", "--camera.width", "320", "--camera.height", "240", "--camera.fps", "15")
+VIRTUAL = ("--camera", "virtual", "--camera.width", "320", "--camera.height", "240", "--camera.fps", "15")
 """A small and slow virtual camera, as several run on one machine; the transport's own words set its script."""
 PATIENT = ("--control.sign-timeout", "5")
 """For a control whose signs a busy machine may delay, where that is not the subject."""
@@ -304,7 +304,7 @@ class ChainContract:
 
 
 RUN = (
-    *("--headless", "--json", *FORWARD, "--virtual-hand.script", "Stop:2 Forward:600"),
+    *("--headless", "--json", *VIRTUAL, "--virtual-hand.script", "Stop:2 Forward:600"),
     *("--control.max-linear", "0.1", "--control.engage-by", "hold"),
 )
 """A run that drives a robot of another process, at 0.1 m/s in the end."""

@@ -11,8 +11,8 @@ import pytest
 
 from tests.contracts.node_contract import (
     CMD_VEL,
-    FORWARD,
     ODOM,
+    VIRTUAL,
     ControlContract,
     Driver,
     MakeDriver,
@@ -129,7 +129,7 @@ def driving_chain(graph: PeerGraph) -> Running:
         "robot": lambda: graph.node("robot", "--world", "empty", name="/robot"),
         "control": lambda: graph.node("control", name=f"/{NODE}", ros=("-p", "max_linear:=0.3")),
         "recognition": lambda: graph.node("recognition", name="/hand_sign_recognition"),
-        "camera": lambda: graph.node("camera", *FORWARD, name="/my_camera", ros=SCRIPT),
+        "camera": lambda: graph.node("camera", *VIRTUAL, name="/my_camera", ros=SCRIPT),
     }
     return Running(graph.peer, start)
 
@@ -190,7 +190,7 @@ class Ros2NodeContract(ControlContract):
         peer.ask("advertise", topic="/clock", type="Clock", reliable=False, depth=1)
         peer.ask("record", topic=topic, type=kind, fields=["header.stamp"], reliable=False)
         words = ("-r", "__ns:=/simulated", "-p", "use_sim_time:=true")
-        camera = graph.node("camera", *FORWARD, name="/simulated/my_camera", ros=words)
+        camera = graph.node("camera", *VIRTUAL, name="/simulated/my_camera", ros=words)
         eventually(lambda: peer.ask("listeners", topic="/clock") > 0)
         peer.ask("run_clock", from_s=1000.0, seconds=30.0)
         eventually(lambda: [v for _, (v,) in peer.ask("get", topic=topic) if 1000.0 < v < 1040.0], 15.0)

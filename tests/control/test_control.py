@@ -69,7 +69,7 @@ def test_reasons_say_why_the_robot_stands() -> None:
     ]
 
 
-RENEW = ControlConfig(renew_time=3.0, rule="cruise")
+RENEW = ControlConfig(renew_time=3.0)
 JOYSTICK = RENEW.model_copy(update={"mode": "joystick"})
 
 

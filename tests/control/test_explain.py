@@ -46,7 +46,7 @@ def test_an_effect_names_step_and_limit() -> None:
 
 
 def test_an_effect_is_that_of_the_rule() -> None:
-    cruise = ControlConfig(rule="cruise", cruise_step=0.2, cruise_turn=0.8, max_linear=0.6)
-    assert effect_of("forward", cruise) == "a step faster forward; keeps turning (0.2 m/s a step, up to 0.6 m/s)"
-    assert effect_of("turn_left", cruise).endswith("(1.5 rad/s a second, up to 0.8 rad/s)")
-    assert effect_of("go", cruise) == "drives straight on; keeps its speed"
+    point = ControlConfig(rule="point", point_turn=0.8, max_linear=0.6)
+    assert effect_of("forward", point) == ("drives where it points; raise the hand to go faster (up to 0.6 m/s)")
+    assert effect_of("turn_left", point) == "turns left in place (up to 0.8 rad/s)"
+    assert effect_of("go", point) == "drives straight on; keeps its speed"

@@ -162,7 +162,7 @@ class Histories(RuleBasedStateMachine):
 
     @initialize(
         mode=st.sampled_from(["signs", "joystick"]),
-        by=st.sampled_from(["course", "cruise"]),
+        by=st.sampled_from(["course", "point"]),
         ramp=st.sampled_from(["per_message", "per_second"]),
         guards=st.tuples(st.booleans(), st.booleans(), st.booleans()),
         engage_by=st.sampled_from(["gesture", "hold"]),
@@ -178,9 +178,13 @@ class Histories(RuleBasedStateMachine):
         }
         self.config = ControlConfig.model_validate({"mode": mode, "rule": by, "ramp": ramp, **limits})
         self.control = Control(self.config, arming=arming, engage=engage, renew=renew)
-        self.onlooker = Onlooker(mode, arming, engage, engage_by=engage_by, renew=renew)
+        self.onlooker = Onlooker(self.what_drives, arming, engage, engage_by=engage_by, renew=renew)
         self.commanded, self.commanded_s, self.source = ZERO, 0.0, "none"
         self.get_ready()
+
+    @property
+    def what_drives(self) -> str:
+        return "joystick" if self.config.by_stick else "signs"
 
     def look(self, velocity: Velocity | None) -> None:
         """Compare what is commanded with what the onlooker knows."""
@@ -213,9 +217,11 @@ class Histories(RuleBasedStateMachine):
         self.onlooker.sign(sign)
         self.onlooker.shows("signs", sign)
         deflection = (stick.forward, stick.left)
-        self.onlooker.shows("joystick", deflection if stick.held and any(deflection) else 0.0)
-        if self.config.mode == "joystick":
-            self.onlooker.hand(asks=stick.held, released=not stick.held, stops=False)
+        # Where the hand points drives, a sign that stops does so whatever the stick says.
+        is_held = stick.held and not (self.config.points and sign in {"Stop", "NONE"})
+        self.onlooker.shows("joystick", deflection if is_held and any(deflection) else 0.0)
+        if self.config.by_stick:
+            self.onlooker.hand(asks=is_held, released=not is_held, stops=False)
         else:
             self.onlooker.hand(asks=sign not in {"Stop", "NONE"}, released=False, stops=sign == "Stop")
         self.look(self.control.step(0.0, sign=sign, stick=stick))
@@ -320,13 +326,13 @@ class Histories(RuleBasedStateMachine):
         self.control.safety.robot_is_away("nobody listens")
         self.look(self.control.halt())
 
-    @rule(mode=st.sampled_from(["signs", "joystick"]), by=st.sampled_from(["course", "cruise"]))
+    @rule(mode=st.sampled_from(["signs", "joystick"]), by=st.sampled_from(["course", "point"]))
     def change_the_rule(self, mode: str, by: str) -> None:
         config = self.config.model_copy(update={"mode": mode, "rule": by})
         if (mode, by) != (self.config.mode, self.config.rule):
             self.onlooker.hold_up(disarms=True)
-            self.onlooker.mode = mode
         self.config = config
+        self.onlooker.mode = self.what_drives
         self.look(self.control.reconfigure(config))
 
     @rule(dt_s=st.sampled_from([-1.0, math.nan, math.inf]))

@@ -1,11 +1,11 @@
 import math
 
 import pytest
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import ControlConfig
-from handsteer.control.sign_control import CruiseControl, SignControl
+from handsteer.control.sign_control import SignControl
 from handsteer.types import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP, TURN_LEFT, TURN_RIGHT, ZERO, Velocity
 
 DT = 1 / 30
@@ -99,92 +99,6 @@ def test_steps_add_up_to_round_numbers() -> None:
     control = SignControl(ControlConfig())
     speeds = [velocity.linear_mps for _ in range(40) if (velocity := control.step(FORWARD, 0.03))]
     assert speeds == [round(0.01 * step, 2) for step in range(1, 41)]
-
-
-CRUISE = ControlConfig(
-    rule="cruise", cruise_step=0.2, cruise_step_time=0.5, cruise_acceleration=1.0, cruise_turn=1.0, max_linear=0.7
-)
-
-
-def cruise(control: SignControl, sign: str, seconds: float) -> tuple[float, float]:
-    """Show a sign; return the velocity in the end."""
-    for _ in range(round(seconds / DT)):
-        control.step(sign, DT)
-    return control.velocity.linear_mps, control.velocity.angular_radps
-
-
-@pytest.fixture
-def cruising() -> CruiseControl:
-    return CruiseControl(CRUISE)
-
-
-def test_forward_sets_a_speed_in_steps_and_the_robot_follows_it(cruising: CruiseControl) -> None:
-    assert cruise(cruising, FORWARD, 0.4) == pytest.approx((0.2, 0), abs=1e-6)
-    assert cruise(cruising, GO, 5) == pytest.approx((0.2, 0), abs=1e-6)
-    assert cruise(cruising, FORWARD, 0.9) == pytest.approx((0.6, 0), abs=1e-6)
-    assert cruise(cruising, FORWARD, 5) == pytest.approx((0.7, 0), abs=1e-6), "the limit"
-
-
-def test_backward_brakes_to_a_stand_and_then_reverses(cruising: CruiseControl) -> None:
-    cruise(cruising, FORWARD, 1.4)
-    assert cruise(cruising, BACKWARD, 1.9) == (0, 0)
-    assert cruise(cruising, BACKWARD, 0.5) == pytest.approx((-0.2, 0), abs=1e-6)
-    assert cruise(cruising, FORWARD, 0.9) == (0, 0)
-    assert cruise(cruising, FORWARD, 0.5) == pytest.approx((0.2, 0), abs=1e-6)
-
-
-def test_a_turn_lasts_while_it_is_shown_or_the_speed_changes(cruising: CruiseControl) -> None:
-    cruise(cruising, FORWARD, 0.4)
-    assert cruise(cruising, TURN_LEFT, 2) == pytest.approx((0.2, 1), abs=1e-6)
-    assert cruise(cruising, FORWARD, 0.4) == pytest.approx((0.4, 1), abs=1e-6)
-    assert cruise(cruising, TURN_RIGHT, 2) == pytest.approx((0.4, -1), abs=1e-6)
-    assert cruise(cruising, GO, 1) == pytest.approx((0.4, 0), abs=1e-6)
-
-
-def test_it_speeds_up_in_a_curve() -> None:
-    control = CruiseControl(ControlConfig(rule="cruise", cruise_step=1.0, cruise_acceleration=0.5))
-    cruise(control, FORWARD, 0.2)
-    linear, angular = cruise(control, TURN_LEFT, 1)
-    assert linear == pytest.approx(0.6, abs=0.05)
-    assert angular > 0.5
-
-
-@pytest.mark.parametrize(("sign", "seconds"), [(STOP, DT), (NONE, DT), (NONE, 0.2), (NONE, 0.5), (NONE, 0.6)])
-@pytest.mark.parametrize("after", [GO, TURN_LEFT])
-def test_stop_and_a_lost_hand_end_all(cruising: CruiseControl, sign: str, seconds: float, after: str) -> None:
-    cruise(cruising, FORWARD, 2)
-    cruise(cruising, TURN_LEFT, 2)
-    assert cruising.step(sign, DT) == ZERO
-    cruise(cruising, sign, seconds)
-    assert cruise(cruising, after, 2)[0] == 0
-
-
-def test_a_robot_that_was_held_back_does_not_speed_up_by_itself(cruising: CruiseControl) -> None:
-    cruise(cruising, FORWARD, 2)
-    cruising.hold_back(Velocity(0.1, 0.0))
-    assert cruise(cruising, GO, 5) == pytest.approx((0.1, 0), abs=1e-6)
-
-
-@given(steps)
-@example([(FORWARD, 0.0), (TURN_RIGHT, 0.125), (FORWARD, 0.125), (NONE, 0.03125), (None, 0.1875), (FORWARD, 0.0)])
-def test_cruise_is_within_limits_and_no_message_makes_it_faster_than_time_does(
-    shown: list[tuple[str | None, float]],
-) -> None:
-    control = CruiseControl(CRUISE)
-    before, interrupted = ZERO, False
-    for sign, dt_s in shown:
-        control.step(sign, dt_s)
-        now = control.velocity
-        assert abs(now.linear_mps) <= CRUISE.max_linear
-        assert abs(now.angular_radps) <= CRUISE.cruise_turn
-        # In one step it may wait for the next message up to the timeout.
-        assert abs(now.linear_mps) - abs(before.linear_mps) <= CRUISE.cruise_acceleration * CRUISE.sign_timeout + 1e-6
-        if sign in {STOP, NONE}:
-            assert now == ZERO
-        # After NONE, with or without a pause, it continues from where it was.
-        interrupted = sign == NONE or (sign is None and interrupted)
-        if not interrupted:
-            before = now
 
 
 def test_extra_messages_do_not_make_it_faster() -> None:

@@ -11,9 +11,9 @@ import pytest
 
 from tests.contracts.node_contract import (
     CMD_VEL,
-    FORWARD,
     ODOM,
     PATIENT,
+    VIRTUAL,
     ChainContract,
     Running,
     twists,
@@ -134,7 +134,7 @@ def test_what_does_not_fit_is_said_in_words(fresh: DdsGraph) -> None:
     peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5, latched=True)
     peer.ask("advertise", topic="/gesture/hand_sign", type="Twist")
     peer.ask("introduce", name="viewer")
-    camera = fresh.node("camera", *FORWARD, name="/my_camera")
+    camera = fresh.node("camera", *VIRTUAL, name="/my_camera")
     control = fresh.node("control", name=f"/{NODE}")
     profile = "the publisher is volatile, the subscriber wants transient local"
     line = f"/image_raw: nothing passes between our publisher and the subscriber of /viewer: {profile}"
@@ -176,7 +176,7 @@ def test_several_robots_share_one_tree_of_transforms(fresh: DdsGraph) -> None:
 
 def test_a_node_says_once_that_it_is_ready_and_names_its_topics_as_others_know_them(fresh: DdsGraph) -> None:
     words = ("-r", "__ns:=/r1", "-r", "image_raw:=/front/image")
-    camera = fresh.node("camera", *FORWARD, name="/r1/my_camera", ros=words)
+    camera = fresh.node("camera", *VIRTUAL, name="/r1/my_camera", ros=words)
     line = (
         "/r1/my_camera is ready: publishes /diagnostics, /front/camera_info, /front/image, "
         "/front/image/compressed, /r1/audit, /r1/stopped; listens to /r1/stop"
@@ -187,7 +187,7 @@ def test_a_node_says_once_that_it_is_ready_and_names_its_topics_as_others_know_t
 
 def test_raw_images_for_another_machine_are_warned_of_once(fresh: DdsGraph) -> None:
     near, far, farther = fresh.peer, fresh.start_peer("far"), fresh.start_peer("farther")
-    camera = fresh.node("camera", *FORWARD, name="/my_camera")
+    camera = fresh.node("camera", *VIRTUAL, name="/my_camera")
     images = {"topic": "/image_raw", "type": "Image", "fields": ["width"], "reliable": False}
     near.ask("record", **images)
     near.ask("introduce", name="near")

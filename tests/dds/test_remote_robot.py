@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from tests.contracts.node_contract import VIRTUAL
 from tests.dds.graph import DdsGraph
 from tests.processes import Peer, Process, eventually
 
@@ -18,7 +19,7 @@ pytest.importorskip("cyclonedds")
 pytestmark = pytest.mark.slow
 
 ROBOT = Path(__file__).with_name("robot.py")
-CAMERA = ("--headless", "--json", "--camera", "virtual", "--camera.width", "320", "--camera.height", "240")
+CAMERA = ("--headless", "--json", *VIRTUAL)
 FORWARD = "Stop:2 Forward:25"  # neutral again for a machine so busy that the robot was stopped
 STOP_S = 0.5
 

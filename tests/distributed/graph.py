@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tests.contracts.node_contract import VIRTUAL
 from tests.dds.graph import PEER, ROS_VARIABLES
 from tests.distributed.network import DEVICE, ROBOT, WORKSTATION, Link, Machine
 from tests.processes import Peer, Process, as_tests_drive, eventually
@@ -17,7 +18,6 @@ ODOM = "/robot_diff_drive_controller/odom"
 SIGN = "/gesture/hand_sign"
 DIAGNOSTICS = "/diagnostics"
 SPEED_MPS = 0.3
-CAMERA = ("--camera", "virtual", "--camera.width", "320", "--camera.height", "240")
 SUBNET = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
 STATIC_PEERS = {"ROS_STATIC_PEERS": f"{ROBOT};{WORKSTATION}"}
 WITH_CLOCK = Path(__file__).with_name("with_clock.py")
@@ -98,7 +98,7 @@ class TwoMachines:
     def camera(self, script: str, *options: str, on: Machine | None = None, ahead_s: float = 0.0) -> Process:
         """Start a camera that shows the virtual hand, on the robot's machine by default."""
         ros = ("-p", f"virtual_hand.script:={script}")
-        return self.node(on or self.robot, "camera", *CAMERA, *options, ros=ros, ahead_s=ahead_s)
+        return self.node(on or self.robot, "camera", *VIRTUAL, *options, ros=ros, ahead_s=ahead_s)
 
     def start(
         self,

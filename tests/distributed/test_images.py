@@ -10,7 +10,7 @@ from tests.processes import Peer, eventually
 pytest.importorskip("cyclonedds")
 pytestmark = [pytest.mark.netns, pytest.mark.slow]
 
-FPS = 15
+FPS = 15  # of machines.camera
 WATCHED_S = 4.0
 
 
@@ -34,7 +34,7 @@ def test_images_cross_a_link_that_loses_some_in_order_and_hold_up_no_one_near(
     for name, peer in subscribers.items():
         is_reliable = name != "best effort"
         peer.ask("record", topic=topic, type=kind, fields=["header.stamp"], depth=10, reliable=is_reliable)
-    machines.camera("Forward:600", "--camera.fps", str(FPS))
+    machines.camera("Forward:600")
     for name, peer in subscribers.items():
         eventually(lambda peer=peer: stamps(peer, topic), what=f"an image: {name}")  # type: ignore[misc]
     began_s = time.monotonic()

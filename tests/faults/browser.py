@@ -22,7 +22,7 @@ from handsteer.plugins.page.page_process import PageProcess
 from handsteer.timeouts import ROBOT_S
 from handsteer.transports.base import Received
 from tests.faults.stepped import Outcome
-from tests.plugins.page.browsers import a_browser
+from tests.plugins.page.browsers import TILTS_UNASKED, a_browser
 from tests.plugins.study.plans import a_task
 
 FAULT_S, AFTER_S = 2.0, 1.5
@@ -67,6 +67,7 @@ class Rig:
     def open(self) -> None:
         """Open the driver's page."""
         context = self.browser.new_context(**(PHONE if self.by == "tilt" else {}))
+        context.add_init_script(TILTS_UNASKED)
         self.page: Page = context.new_page()
         self.page.set_default_timeout(1000 * PATIENCE_S)
         self.page.goto(self.url)

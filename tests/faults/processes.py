@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tests.contracts.node_contract import CMD_VEL, FORWARD, ODOM
+from tests.contracts.node_contract import CMD_VEL, ODOM, VIRTUAL
 from tests.dds.graph import DdsGraph
 from tests.faults.stepped import Outcome
 from tests.processes import Process, eventually
@@ -44,7 +44,7 @@ OPTIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("-p", f"max_linear:={SPEED_MPS}", "-p", "linear_step:=0.02"),
     ),
     "recognition": ((), ()),
-    "camera": (FORWARD, ()),
+    "camera": (VIRTUAL, ()),
 }
 SIGNS, SIMULATED = "signs", "simulated time"
 SIGNALS = ("SIGKILL", "SIGSTOP", "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGABRT", "SIGTERM", "SIGINT")

@@ -74,7 +74,8 @@ class Rules:
         if speed != self._stick_speed or not asks:
             self._stick_speed, self._stick_changed_s = speed, self.now_s
         paused = self.now_s - self._stick_spoke_s >= STICK_PAUSE_S - _EPSILON_S
-        self._robot_waits = self._robot_waits and asks
+        # A stick that was released before and is deflected now asks anew.
+        self._robot_waits = self._robot_waits and asks and self._stick_asks
         is_lost = paused and self._stick_asks
         self._stick_asks = asks
         self._stick_was_neutral = not asks or (self._stick_was_neutral and not is_lost)
@@ -110,6 +111,10 @@ class Rules:
         """
         self._robot_waits = self.now_s - self._changed_s > CONFIRMED_S
         self._stands_by_s = min(self._stands_by_s, self.now_s + PATIENCE_S)
+
+    def recognition_begins(self) -> None:
+        """It knows no sign yet: until one is confirmed, zero is commanded, which is what a robot waits for."""
+        self._robot_waits = False
 
     def stands(self) -> None:
         """The robot stands: if it has to, then from now on."""

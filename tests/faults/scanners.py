@@ -56,6 +56,7 @@ def scanners() -> Iterator[Row]:
         ("the scanner's angles are NaN", replace(FREE, angle_increment=math.nan), False),
         ("the scanner stamps scans 5 s back", replace(FREE, age_s=5.0), False),
         ("the scanner stamps scans 5 s ahead; then the driver stops", replace(FREE, age_s=-5.0), True),
+        ("the scanner repeats one scan", _room(), False),
         ("the scanner gives NaN for two thirds of its rays; then the driver stops", _with_gaps(), True),
     ):
         yield _row(words, _shows(sees), _shows(FREE), leaves=leaves)
@@ -91,6 +92,13 @@ def _shows(sees: RangeScan | None) -> Callable[[Chain], None]:
 
 def _with(metres: float) -> RangeScan:
     return replace(FREE, ranges=np.full(RAYS, metres, np.float32))
+
+
+def _room() -> RangeScan:
+    """Return what a room looks like: walls 3 m ahead and 2 m to the sides"""
+    angles = FREE.angle_min + np.arange(RAYS) * FREE.angle_increment
+    walls = np.minimum(3.0 / np.maximum(np.abs(np.cos(angles)), 1e-6), 2.0 / np.maximum(np.abs(np.sin(angles)), 1e-6))
+    return replace(FREE, ranges=np.minimum(walls, 7.0).astype(np.float32))
 
 
 def _with_gaps() -> RangeScan:

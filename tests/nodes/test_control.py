@@ -1076,3 +1076,58 @@ def test_steering_that_was_held_while_the_control_was_stalled_has_to_let_go() ->
 def test_the_axes_of_any_joystick_are_read_within_one() -> None:
     """The guard: the limits in ``stick_in``."""
     assert stick_in(joy_of(Stick(held=True, forward=50.0, left=-1e30), HEADER)) == Stick(True, 1.0, -1.0)
+
+
+@pytest.mark.parametrize("arming", [False, True])
+def test_while_it_is_deactivated_it_commands_nothing_and_then_waits_for_neutral(arming: bool) -> None:
+    bench = ControlBench(arming=arming)
+    twists = bench.record(CMD_VEL)
+    bench.show(*["Stop"] * 40, *["Forward"] * 10)
+    assert twists[-1].linear.x > 0.0
+    assert bench.control.set_active(False)
+    assert twists[-1].linear.x == 0.0
+    silent = len(twists)
+    bench.show("NONE", *["Forward"] * 20)
+    bench.run(1.0)
+    bench.control.reconfigure(Config(control=ControlConfig(max_linear=0.5)))
+    bench.run(0.1)
+    assert len(twists) == silent
+    assert bench.control.set_active(True)
+    bench.show(*["Forward"] * 20)
+    assert {twist.linear.x for twist in twists[silent:]} == {0.0}
+    bench.show(*["Stop"] * 20, *["Forward"] * 5)
+    assert twists[-1].linear.x > 0.0
+
+
+def test_steering_that_was_held_while_it_was_deactivated_must_be_released() -> None:
+    bench = ControlBench()
+    twists = bench.record(CMD_VEL)
+    bench.steering.steer(0.0, 0.0)
+    bench.run(0.1)
+    bench.control.set_active(False)
+    bench.control.set_active(True)
+    bench.steering.steer(0.3, 0.0)
+    bench.run(0.1)
+    assert {twist.linear.x for twist in twists} == {0.0}
+    bench.steering.steer(0.0, 0.0)
+    bench.run(0.1)
+    bench.steering.steer(0.3, 0.0)
+    bench.run(0.1)
+    assert twists[-1].linear.x == 0.3
+
+
+def test_a_stop_while_it_is_deactivated_is_remembered() -> None:
+    bench = ControlBench()
+    bench.control.set_active(False)
+    bench.stop.publish(Bool(data=True))
+    bench.run(0.1)
+    bench.control.set_active(True)
+    twists = bench.record(CMD_VEL)
+    bench.show("Stop", *["Forward"] * 5)
+    assert {twist.linear.x for twist in twists} == {0.0}
+
+
+def test_whether_the_hand_drives_can_be_asked() -> None:
+    bench = ControlBench(engage=True)
+    assert bench.control.services()["engage_state"]().startswith("disengaged: ")
+    assert ControlBench().control.services()["engage_state"]() == "engaged"

@@ -137,7 +137,7 @@ def test_a_status_survives_the_way_to_diagnostics_and_back(status: Status) -> No
 
 def test_a_status_has_plain_values_with_names_that_stay() -> None:
     course = CourseState(8, 3, frozenset({2, 0}), 1, 12.5, "running")
-    robot = RobotStatus(2, 1.25, Pose2D(5.0, 2.0, 0.5), course, touches=("crate", "a, b"))
+    robot = RobotStatus(2, 1.25, Pose2D(5.0, 2.0, 0.5), course, "slalom", touches=("crate", "a, b"))
     assert values_of(robot) == {
         "collisions": "2",
         "path_length_m": "1.25",
@@ -150,6 +150,7 @@ def test_a_status_has_plain_values_with_names_that_stay() -> None:
         "course_bumps": "1",
         "course_time_s": "12.5",
         "course_phase": "running",
+        "world": "slalom",
         "trouble": "",
         "touches": 'crate,"a, b"',
     }

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from handsteer.cameras.files import SensorNoise
+from handsteer.clock import to_stamp
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ConfigError
 from handsteer.images import bgr_image, image_message, jpeg_message
@@ -17,12 +18,16 @@ from handsteer.messages import (
     HAND_SIGN,
     IMAGE_ANNOTATED,
     IMAGE_COMPRESSED,
+    IMAGE_DRAWN,
+    IMAGE_LANDMARKS,
     IMAGE_RAW,
     Header,
     Image,
     String,
     Time,
     engages_in,
+    pointing_in,
+    stick_in,
 )
 from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.recognition import HandSignRecognitionNode
@@ -32,7 +37,7 @@ from handsteer.recognition.custom_signs import save_custom_model
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
-from handsteer.types import FORWARD
+from handsteer.types import FORWARD, RELEASED
 from tests.nodes.stepping import Bench
 from tests.recognition.hands import RecordedLandmarker, show_fingers, show_sign
 from tests.recognition.models import model
@@ -67,6 +72,21 @@ class RecognitionBench(Bench):
 
     def picture(self, scene: np.ndarray = GREY) -> np.ndarray:
         return NOISE.on(scene, self.clock.now())
+
+    def play(self, numbers: Sequence[int], *, every_s: float | None = None) -> list[str]:
+        """Play these images of a recording at ten a second; return the signs that follow before it is over.
+
+        ``every_s`` is how often one arrives; None for all at once, before the node has looked at the first.
+        """
+        before = len(self.signs)
+        for number in numbers:
+            header = Header(stamp=to_stamp(1.0 + number / 10), frame_id="camera")
+            image = image_message(NOISE.on(TEXTURE, number / 10), header)
+            self.images.publish(image, self.clock.now() - 86_400.0 + number / 10)
+            if every_s is not None:
+                self.run(every_s)
+        self.run(0.0)
+        return [sign.data for sign in self.signs[before:]]
 
     def show(self, image: Image | None = None, frames: int = 1, age_s: float = 0.0) -> None:
         for _ in range(frames):
@@ -105,7 +125,7 @@ def test_the_hand_as_a_joystick_is_published_for_who_subscribes() -> None:
     bench.show(frames=30)
     joys = bench.record(GESTURE_JOY)
     bench.show(frames=10)
-    assert [joy.buttons.tolist() for joy in joys] == [[0, 0]] * 10, "nobody saw the hand open"
+    assert [joy.buttons[:2].tolist() for joy in joys] == [[0, 0]] * 10, "nobody saw the hand open"
     assert joys[0].header == HEADER
 
 
@@ -114,9 +134,9 @@ def test_a_fist_that_closes_is_held_until_no_frames_come() -> None:
     joys = bench.record(GESTURE_JOY)
     bench.show(frames=30)
     assert [int(joy.buttons[0]) for joy in joys] == [0] * 23 + [1] * 7
-    assert joys[-1].axes.tolist() == [0.0, 0.0]
+    assert joys[-1].axes.tolist() == [0.0] * 4
     bench.run(1.0)
-    assert joys[-1].buttons.tolist() == [0, 0]
+    assert joys[-1].buttons.tolist() == [0, 0, 0]
 
 
 def test_the_gesture_that_engages_is_published_with_the_joystick() -> None:
@@ -273,13 +293,85 @@ def test_a_camera_that_repeats_what_it_has_seen_stops_within_half_a_second(lengt
     assert bench.names[-1] == "NONE"
 
 
-def test_a_recording_that_starts_again_is_followed() -> None:
-    bench = RecognitionBench(SignsConfig(recorded="always"), hands=[show_sign(FORWARD)] * 100)
-    recording = [image_message(NOISE.on(TEXTURE, index / 30), HEADER) for index in range(20)]
+RECORDED = SignsConfig(recorded="always")
+ONCE = ["NONE"] + ["Forward"] * 19
+
+
+@pytest.mark.parametrize("every_s", [None, 0.0, 0.1, 0.7])
+def test_a_recording_gives_the_same_signs_each_time_however_fast_it_comes(every_s: float | None) -> None:
+    bench = RecognitionBench(RECORDED)
     for _ in range(3):
-        for image in recording:
-            bench.show(image, age_s=1000.0)
-    assert bench.names[-40:] == ["Forward"] * 40
+        assert bench.play(range(20), every_s=every_s) == ONCE
+
+
+def test_of_a_camera_the_newest_image_counts_and_of_a_recording_each() -> None:
+    bench = RecognitionBench()
+    for number in range(20):
+        bench.images.publish(image_message(NOISE.on(TEXTURE, number / 10), HEADER), bench.clock.now())
+    bench.run(0.0)
+    assert len(bench.names) == 1
+
+
+def test_a_gap_in_a_recording_is_a_loss_of_the_hand() -> None:
+    bench = RecognitionBench(RECORDED)
+    assert bench.play([*range(5), *range(20, 25)]) == 2 * (["NONE"] + ["Forward"] * 4)
+
+
+def test_an_image_that_a_recording_repeats_becomes_none_by_its_stamps() -> None:
+    bench = RecognitionBench(RECORDED)
+    same = image_message(NOISE.on(TEXTURE, 0.0), HEADER)
+    bench.play(range(5))
+    for number in range(5, 12):
+        header = Header(stamp=to_stamp(1.0 + number / 10), frame_id="camera")
+        bench.images.publish(dataclasses.replace(same, header=header), -86_400.0 + number / 10)
+    bench.run(0.0)
+    assert bench.names == ["NONE"] + ["Forward"] * 4 + ["NONE"] * 4
+
+
+def test_a_stall_of_this_process_changes_nothing_of_a_recording() -> None:
+    bench = RecognitionBench(RECORDED)
+    first = bench.play(range(5))
+    bench.clock.advance(0.9)
+    assert first + bench.play(range(5, 20)) == ONCE
+
+
+def test_what_was_played_is_logged_when_it_ends_or_begins_again(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO")
+    bench = RecognitionBench(RECORDED)
+    for _ in range(2):
+        bench.play(range(20))
+    bench.run(5.1)
+    said = [message for message in caplog.messages if "images of a recording" in message]
+    assert said == 2 * ["20 images of a recording: NONE 1, Forward 19"]
+
+
+def test_a_recording_that_stops_becomes_none_after_a_second() -> None:
+    bench = RecognitionBench(RECORDED)
+    bench.play(range(5))
+    bench.run(0.9)
+    assert bench.names[-1] == "Forward"
+    bench.run(0.15)
+    assert bench.names[-1] == "NONE"
+
+
+def test_the_joystick_of_a_recording_is_of_now() -> None:
+    bench = RecognitionBench(RECORDED)
+    joys = bench.record(GESTURE_JOY)
+    bench.run(10.0)
+    bench.play(range(2))
+    assert [joy.header.stamp for joy in joys[-2:]] == [bench.clock.stamp(bench.clock.now())] * 2
+
+
+def test_a_recording_waits_only_up_to_a_size_which_is_said(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("handsteer.nodes.recognition._MOST_PLAYED_BYTES", 5 * TEXTURE.size)
+    bench = RecognitionBench(RECORDED)
+    assert bench.play(range(20)) == ["NONE"] + ["Forward"] * 4
+    assert [message for message in caplog.messages if "5 messages wait" in message] == [
+        "/image_raw: 5 messages wait, and new ones are dropped: the recording is played faster than this machine "
+        "recognises: play it at a lower rate (-r 0.5)"
+    ]
 
 
 def test_a_black_picture_is_no_frame(bench: RecognitionBench) -> None:
@@ -288,6 +380,23 @@ def test_a_black_picture_is_no_frame(bench: RecognitionBench) -> None:
         bench.show(image_message(NOISE.on(np.zeros_like(GREY), bench.clock.now()), HEADER))
     assert set(bench.names) == {"NONE"}
     assert statuses[-1].status[0].message == "the picture is black: is the lens covered?"
+
+
+def test_the_name_of_the_sign_is_only_in_the_annotated_picture_and_the_person_not_in_the_drawn_one(
+    bench: RecognitionBench,
+) -> None:
+    topics = (IMAGE_ANNOTATED, IMAGE_LANDMARKS, IMAGE_DRAWN, IMAGE_RAW)
+    recorded = [bench.record(topic) for topic in topics]
+    bench.show(frames=5)
+    annotated, landmarks, drawn, raw = (bgr_image(messages[-1]) for messages in recorded)
+    # The label is in the upper left, where no hand is.
+    corner = (slice(0, len(raw) // 8), slice(0, raw.shape[1] // 3))
+    mirrored = raw[:, ::-1][corner]
+    assert not np.array_equal(annotated[corner], mirrored)
+    assert np.array_equal(landmarks[corner], mirrored)
+    assert not drawn[corner].any()
+    assert drawn.any(), "the hand is drawn"
+    assert (drawn == 0).mean() > 0.8
 
 
 def test_the_annotated_picture_is_made_on_demand_and_mirrored(bench: RecognitionBench) -> None:
@@ -368,10 +477,10 @@ def test_frames_that_come_late_are_told_from_none() -> None:
 
 
 def test_a_recording_is_followed_when_that_is_asked_for() -> None:
-    bench = RecognitionBench(SignsConfig(recorded="always"))
-    bench.show(frames=10, age_s=86_400.0)
+    bench = RecognitionBench(RECORDED)
+    bench.play(range(10), every_s=0.1)
     assert bench.names[-1] == "Forward"
-    bench.run(0.5)
+    bench.run(1.0)
     assert bench.names[-1] == "NONE"  # it has ended
 
 
@@ -529,3 +638,40 @@ def test_a_picture_that_was_passed_over_is_not_new_when_it_comes_again(bench: Re
         bench.show(image)
     assert set(bench.names) <= {"NONE"}
     assert bench.node.counts == {}
+
+
+def test_where_the_hand_points_is_published_with_the_joystick() -> None:
+    bench = RecognitionBench(hands=[show_sign("Forward", tilt=0.6)] * 20 + [show_sign("Stop")] * 10)
+    joys = bench.record(GESTURE_JOY)
+    bench.show(frames=20)
+    points = pointing_in(joys[-1])
+    assert points.held
+    assert points.forward > 0
+    assert points.left > 0.5, "clockwise in the picture is the person's left"
+    assert not stick_in(joys[-1]).held
+    bench.show(frames=10)
+    assert pointing_in(joys[-1]) == RELEASED
+    bench.run(1.0)
+    assert joys[-1].buttons.tolist() == [0, 0, 0]
+
+
+def test_while_it_is_deactivated_it_publishes_one_none_and_looks_at_nothing(bench: RecognitionBench) -> None:
+    statuses = bench.record(DIAGNOSTICS)
+    bench.show(frames=6)
+    bench.signs.clear()
+    assert bench.node.set_active(False)
+    assert bench.names == ["NONE"]
+    bench.show(frames=30)
+    bench.run(1.0)
+    assert bench.names == ["NONE"]
+    assert statuses[-1].status[0].message == "deactivated: another program activates this node"
+    assert bench.node.set_active(True)
+    bench.signs.clear()
+    bench.show(frames=6)
+    assert bench.names == ["NONE"] * 3 + ["Forward"] * 3
+
+
+def test_a_node_that_is_stuck_says_that_it_was_not_deactivated(bench: RecognitionBench) -> None:
+    with bench.node._serving:
+        assert not bench.node.set_active(False, timeout_s=0.01)
+    assert bench.node.is_active

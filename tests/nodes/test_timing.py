@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import Recorded
-from handsteer.nodes.timing import FrameAge, Recording, StallGuard, duration_in_words
+from handsteer.messages import Time
+from handsteer.nodes.timing import FrameAge, PlayedTime, Recording, StallGuard, duration_in_words
 from handsteer.timeouts import BURST_S, DISTRUST_S
 
 
@@ -153,40 +154,58 @@ def followed(
     ]
 
 
-@pytest.mark.parametrize("age_s", [1.0, DAYS_S, 3e8])
+@pytest.mark.parametrize("age_s", [0.0, 1.0, DAYS_S, 3e8])
 def test_what_a_player_sends_is_followed_from_the_first_frame_on(age_s: float) -> None:
-    assert all(followed(Recording("auto", LIMIT_S), [age_s] * 5, by_player=True))
+    assert all(followed(Recording("auto"), [age_s] * 5, by_player=True))
 
 
 def test_a_recording_may_be_paused_looped_and_slowed() -> None:
     ages_s = [50.0, 50.0, 61.0, 61.0, 30.0, 30.0, 30.05, 30.1, 30.15]
-    assert all(followed(Recording("auto", LIMIT_S), ages_s, by_player=True))
+    assert all(followed(Recording("auto"), ages_s, by_player=True))
 
 
 @pytest.mark.parametrize("recorded", ["auto", "never"])
 @pytest.mark.parametrize("age_s", [0.0, 1.0, DAYS_S])
 def test_no_other_frame_is_followed_by_itself(recorded: Recorded, age_s: float) -> None:
-    assert not any(followed(Recording(recorded, LIMIT_S), [age_s] * 30))
+    assert not any(followed(Recording(recorded), [age_s] * 30))
 
 
 def test_nothing_is_followed_when_it_is_switched_off() -> None:
-    assert not any(followed(Recording("never", LIMIT_S), [DAYS_S] * 5, by_player=True))
+    assert not any(followed(Recording("never"), [DAYS_S] * 5, by_player=True))
 
 
 def test_when_asked_for_what_is_older_than_any_link_delays_is_followed() -> None:
-    assert all(followed(Recording("always", LIMIT_S), [DAYS_S] * 5))
-    assert not any(followed(Recording("always", LIMIT_S), [0.0, 0.2, 1.0, 3.0, 4.9]))
+    assert all(followed(Recording("always"), [DAYS_S] * 5))
+    assert not any(followed(Recording("always"), [0.0, 0.2, 1.0, 3.0, 4.9]))
 
 
 @pytest.mark.parametrize("by_player", [True, False])
 def test_a_stamp_that_stands_still_is_not_followed(by_player: bool) -> None:
-    recording = Recording("always", LIMIT_S)
+    recording = Recording("always")
     stood = [recording.follows(now_s, 10.0, by_player=by_player) for now_s in (100.0, 100.1, 100.2)]
     assert stood == [True, False, False]
 
 
+def stamp(ms: int) -> Time:
+    return Time(sec=ms // 1000, nanosec=ms % 1000 * 10**6)
+
+
+def test_played_time_is_that_of_the_stamps_and_begins_anew_where_they_go_back() -> None:
+    played = PlayedTime(LIMIT_S)
+    assert [played.since_last(stamp(ms)) for ms in (5000, 5100, 5300, 5000, 5100)] == [None, 0.1, 0.2, None, 0.1]
+    played.end()
+    assert played.since_last(stamp(5200)) is None, "a camera was seen meanwhile"
+
+
+def test_played_frames_without_a_sign_count_as_none_by_their_stamps() -> None:
+    played = PlayedTime(0.35)
+    assert [played.note(0.1, counts=counts) for counts in (True, False, False, False)] == [False] * 4
+    assert played.note(0.1, counts=False)
+    assert not played.note(0.1, counts=True)
+
+
 def test_the_hint_waits_until_frames_have_come_in_step(caplog: pytest.LogCaptureFixture) -> None:
-    recording = Recording("auto", LIMIT_S)
+    recording = Recording("auto")
     hints = []
     for number in range(20):
         now_s = 100.0 + number / 10
@@ -199,7 +218,7 @@ def test_the_hint_waits_until_frames_have_come_in_step(caplog: pytest.LogCapture
 
 @pytest.mark.parametrize("step_s", [0.5, -0.5])
 def test_frames_of_a_link_that_gets_slower_or_catches_up_are_no_recording(step_s: float) -> None:
-    recording = Recording("auto", LIMIT_S)
+    recording = Recording("auto")
     for number in range(40):
         now_s = 1000.0 + number / 10
         recording.follows(now_s, now_s - 60.0 - number * step_s, by_player=False)
@@ -207,7 +226,7 @@ def test_frames_of_a_link_that_gets_slower_or_catches_up_are_no_recording(step_s
 
 
 def test_frames_that_come_a_little_late_are_no_recording() -> None:
-    recording = Recording("auto", LIMIT_S)
+    recording = Recording("auto")
     followed(recording, [3.0] * 40)
     assert recording.hint(1_000_004.0) is None
 

@@ -1,10 +1,11 @@
 """What the tests of launch files share."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.bags import busy_machine
 from tests.ros1.launches import LaunchGraph
 
 
@@ -16,3 +17,10 @@ def ros(tmp_path: Path) -> Iterator[LaunchGraph]:
         yield graph.start()
     finally:
         graph.stop()
+
+
+@pytest.fixture
+def busy() -> Iterator[Callable[[int], None]]:
+    """What keeps as many processes busy as it is told, until the test ends."""
+    with busy_machine() as busy:
+        yield busy

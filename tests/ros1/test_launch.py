@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.docs import pages
 from tests.processes import eventually, free_port
 from tests.ros1.launches import ROOT, LaunchGraph, Recorder, run
 
@@ -97,6 +98,24 @@ def test_the_two_terminals_drive_the_robot_by_the_virtual_hand(ros: LaunchGraph)
     assert 'child_frame_id: "front_left_wheel"' in frames
     reports = ros.tell("rostopic", "echo", "-n", "60", "/diagnostics/status[0]/name")
     assert all(name.strip("/") in reports for name in CHAIN)
+
+
+def documented(command: str) -> str:
+    """Return what docs/ros1.md shows that a command prints."""
+    (shown,) = (block for block in pages.blocks("") if f"$ {command}\n" in block.text)
+    return shown.text.partition(f"$ {command}\n")[2].partition("\n$ ")[0]
+
+
+def test_topics_and_nodes_are_listed_as_in_the_documentation(ros: LaunchGraph) -> None:
+    ros.launch(*DRIVE_ROBOT)
+    topics = set(documented("rostopic list").split())
+    eventually(lambda: set(ros.tell("rostopic", "list").split()) == topics, what=f"the topics are {topics}")
+    ros.launch(*SIGN_CONTROL, VIRTUAL)
+    nodes = set(documented("rosnode list").split())
+    eventually(lambda: set(ros.tell("rosnode", "list").split()) == nodes, what=f"the nodes are {nodes}")
+    of_control = re.findall(r"^ \* (/\S+)", documented("rosnode info /hand_sign_control"), re.MULTILINE)
+    told = ros.tell("rosnode", "info", "/hand_sign_control").partition("Services:")[0]
+    assert re.findall(r"^ \* (/\S+)", told, re.MULTILINE) == of_control
 
 
 def test_photos_as_a_30_hz_video_drive_the_robot(ros: LaunchGraph, data_dir: Path, tmp_path: Path) -> None:

@@ -16,10 +16,10 @@ import pytest
 
 from tests.contracts.node_contract import (
     CMD_VEL,
-    FORWARD,
     LIMIT_S,
     ODOM,
     RUN,
+    VIRTUAL,
     ChainContract,
     ControlContract,
     Driver,
@@ -91,6 +91,27 @@ def test_rostopic_pub_gives_one_twist(ros1: Ros1Graph) -> None:
     publish.kill()
 
 
+def test_the_control_is_stopped_reset_and_asked_by_rosservice(ros1: Ros1Graph) -> None:
+    driver = Ros1Driver(ros1, "--control.sign-timeout", "5")
+    node = f"{driver.namespace}/{NODE}"
+
+    def call(service: str) -> list[str]:
+        done = subprocess.run(
+            ["rosservice", "call", f"{node}/{service}"], env=ros1.env, check=True, capture_output=True, text=True
+        )
+        return done.stdout.splitlines()
+
+    driver.show("Forward", count=2)
+    driver.expect((0.01, 0.0), (0.02, 0.0))
+    assert call("stop") == ["success: True", 'message: "stopped, until it is reset"']
+    driver.expect((0.01, 0.0), (0.02, 0.0), (0.0, 0.0))
+    assert call("engage_state") == ["success: True", 'message: "engaged"']
+    assert call("reset") == ["success: True", 'message: "reset"']
+    driver.show("Stop")
+    driver.show("Forward")
+    eventually(lambda: driver.twists[-1] == (0.01, 0.0), what="the robot to be driven")
+
+
 def test_one_zero_when_ros_ends_the_node(ros1: Ros1Graph) -> None:
     driver = Ros1Driver(ros1, "--control.sign-timeout", "5")
     driver.show("Forward")
@@ -123,7 +144,7 @@ def test_compressed_images_are_renamed_with_the_raw_ones_unless_named_themselves
 
 
 def test_camera_info_lies_beside_the_images(ros1: Ros1Graph) -> None:
-    ros1.node("camera", *FORWARD, "__name:=beside", "image_raw:=/front/image", name="/beside")
+    ros1.node("camera", *VIRTUAL, "__name:=beside", "image_raw:=/front/image", name="/beside")
     eventually(lambda: "/beside" in ros1.talkers("/front/camera_info"))
 
 
@@ -243,7 +264,7 @@ class TestChain(ChainContract):
                 "robot": lambda: graph.node("robot", "--world", "empty", name="/robot"),
                 "control": lambda: graph.node("control", "_max_linear:=0.3", name=f"/{NODE}"),
                 "recognition": lambda: graph.node("recognition", name="/hand_sign_recognition"),
-                "camera": lambda: graph.node("camera", *FORWARD, SCRIPT, name="/my_camera"),
+                "camera": lambda: graph.node("camera", *VIRTUAL, SCRIPT, name="/my_camera"),
             }
             yield Running(peer, start)
 
@@ -272,6 +293,6 @@ def test_recognition_of_compressed_images(ros1: Ros1Graph) -> None:
     peer = ros1.peer()
     peer.ask("record", topic="/jpeg/gesture/hand_sign", package="std_msgs", type="String", fields=["data"])
     ros1.node("recognition", "__ns:=/jpeg", "_image_transport:=compressed", name="/jpeg/hand_sign_recognition")
-    ros1.node("camera", "__ns:=/jpeg", *FORWARD, SCRIPT, name="/jpeg/my_camera")
+    ros1.node("camera", "__ns:=/jpeg", *VIRTUAL, SCRIPT, name="/jpeg/my_camera")
     eventually(lambda: ["Forward"] in [values for _, values in peer.ask("get", topic="/jpeg/gesture/hand_sign")])
     assert "/jpeg/hand_sign_recognition" not in ros1.listeners("/jpeg/image_raw")

@@ -1,13 +1,18 @@
-"""A camera's images in a bag of the real rosbag: played again, they drive as they did."""
+"""A camera's images in a bag of the real rosbag: played again, they give the same signs, and drive."""
 
 import shutil
 import signal
 import time
-from itertools import groupby
+from collections.abc import Callable
+from itertools import dropwhile, groupby
 from pathlib import Path
 
 import pytest
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import Stores, get_typestore
 
+from tests.bags import BUSY, FRAMES, PLAYS, frames
+from tests.bags import SHOWN as SHOWN_IN_BAG
 from tests.processes import eventually
 from tests.ros1.launches import LaunchGraph, Recorder
 
@@ -20,6 +25,7 @@ pytestmark = [
 HAND_SIGN = "/gesture/hand_sign"
 ODOM = "/robot_diff_drive_controller/odom"
 TOPICS = {HAND_SIGN: "std_msgs/String", ODOM: "nav_msgs/Odometry"}
+IMAGE = "sensor_msgs/msg/Image"
 PACKAGE = "ros_hand_gesture_recognition"
 SHOWN = ["Stop", "Forward", "Turn Left"]
 
@@ -88,3 +94,49 @@ def test_a_bag_that_comes_by_another_node_is_followed_when_asked_for(ros: Launch
     assert order(record, played_s) == SHOWN
     assert {sign["word"] for sign in record.of("/careful", played_s)} == {"NONE"}
     assert "set the parameter recorded to always" in recognition.text
+
+
+def bag_of_frames(path: Path) -> None:
+    """Write a bag of raw images, of another day."""
+    types = get_typestore(Stores.ROS1_NOETIC)
+    header, image, time_ = (types.types[name] for name in ("std_msgs/msg/Header", IMAGE, "builtin_interfaces/msg/Time"))
+    with Writer(path) as writer:
+        connection = writer.add_connection("/image_raw", IMAGE, typestore=types)
+        for number, (stamp_ns, bgr) in enumerate(frames()):
+            stamp = time_(stamp_ns // 10**9, stamp_ns % 10**9)
+            message = image(header(number, stamp, ""), 240, 320, "bgr8", 0, 960, bgr.reshape(-1))
+            writer.write(connection, stamp_ns, types.serialize_ros1(message, IMAGE))
+
+
+def test_a_bag_gives_the_same_signs_each_time_quiet_and_beside_load(
+    ros: LaunchGraph, tmp_path: Path, busy: Callable[[int], None]
+) -> None:
+    """Each of its images is recognised, in order, each time, quiet and beside busy processes."""
+    bag = tmp_path / "frames.bag"
+    bag_of_frames(bag)
+    record = ros.record({HAND_SIGN: "std_msgs/String"})
+    recognition = ros.run("rosrun", PACKAGE, "hand_sign_recognition.py")
+    eventually(lambda: "/hand_sign_recognition" in ros.listeners("/image_raw"), what="the recognition")
+    eventually(lambda: record.of(HAND_SIGN), what="the recognition's NONE")
+
+    def signs() -> list[str]:
+        """Return the signs of one play, without the NONE before and after: the bag begins and ends with Stop."""
+        played_s = time.monotonic()
+        ros.tell("rosbag", "play", "--wait-for-subscribers", "--rate", "2", str(bag))
+
+        def shown() -> list[str]:
+            words = [str(sign["word"]) for sign in record.of(HAND_SIGN, played_s)]
+            return [*dropwhile(lambda word: word == "NONE", words)]
+
+        eventually(lambda: len(shown()) > FRAMES and shown()[-1] == "NONE", 120.0, "a sign for each image")
+        return [*dropwhile(lambda word: word == "NONE", reversed(shown()))][::-1]
+
+    quiet = [signs() for _ in range(PLAYS)]
+    assert [len(each) for each in quiet] == [FRAMES] * PLAYS
+    assert [word for word, _ in groupby(quiet[0]) if word != "NONE"] == SHOWN_IN_BAG
+    assert all(each == quiet[0] for each in quiet)
+    busy(BUSY)
+    beside_load = [signs() for _ in range(PLAYS)]
+    assert [len(each) for each in beside_load] == [FRAMES] * PLAYS
+    assert all(each == quiet[0] for each in beside_load)
+    assert "dropped" not in recognition.text

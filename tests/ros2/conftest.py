@@ -1,10 +1,11 @@
 """Domains with a node of a real ROS 2 in them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.bags import busy_machine
 from tests.ros2.graph import TRANSPORTS, Ros2Graph
 
 
@@ -27,3 +28,10 @@ def fresh(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Ros2Graph]
     """A domain of the test's own, for each transport of our nodes."""
     with Ros2Graph(tmp_path, request.param) as graph:
         yield graph
+
+
+@pytest.fixture
+def busy() -> Iterator[Callable[[int], None]]:
+    """What keeps as many processes busy as it is told, until the test ends."""
+    with busy_machine() as busy:
+        yield busy

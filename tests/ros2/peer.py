@@ -6,7 +6,8 @@ says, ``topics`` what ``ros2 topic list -t`` says, ``shift`` (from, to, type) pu
 another, ``services`` (node) returns those of a node, and ``servers`` (service) counts who offers it. ``parameters``
 (node, call, arguments) calls one of the parameter services as rclpy's own client does, and returns the reply's fields,
 or None when nobody answers; ``dump`` (node) returns all values as ``ros2 param dump`` writes them, and ``load`` (node,
-values) sets them as ``ros2 param load`` does; ``call`` (service) calls one of std_srvs/Trigger.
+values) sets them as ``ros2 param load`` does; ``call`` (service) calls one of std_srvs/Trigger; ``change_state`` (node,
+transition) and ``state`` (node) are the calls of a lifecycle manager.
 """
 
 import json
@@ -22,6 +23,8 @@ import rclpy
 import yaml
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist, TwistStamped
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Log, ParameterValue
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -194,6 +197,21 @@ def load(order: dict[str, Any]) -> Any:
 def call(order: dict[str, Any]) -> Any:
     client = node.create_client(Trigger, order["service"])
     return waited(client.call_async(Trigger.Request()), 10.0) if client.wait_for_service(20.0) else None
+
+
+def change_state(order: dict[str, Any]) -> Any:
+    """Ask for a transition by its number, as Nav2's lifecycle manager does; return whether it succeeded."""
+    client = node.create_client(ChangeState, f"{order['node']}/change_state")
+    wanted = ChangeState.Request(transition=Transition(id=getattr(Transition, order["transition"])))
+    answer = waited(client.call_async(wanted), 10.0) if client.wait_for_service(20.0) else None
+    return answer and answer["success"]
+
+
+def state(order: dict[str, Any]) -> Any:
+    """Return the state's label, as ``ros2 lifecycle get`` does."""
+    client = node.create_client(GetState, f"{order['node']}/get_state")
+    answer = waited(client.call_async(GetState.Request()), 10.0) if client.wait_for_service(20.0) else None
+    return answer and answer["current_state"]["label"]
 
 
 def waited(answer: Any, timeout_s: float) -> Any:

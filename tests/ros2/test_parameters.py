@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tests.contracts.node_contract import FORWARD
+from tests.contracts.node_contract import VIRTUAL
 from tests.contracts.ros2_node_contract import NODE, DdsDriver
 from tests.processes import eventually
 from tests.ros2.graph import NEEDS_ROS2, Ros2Graph
@@ -83,7 +83,7 @@ def test_a_changed_parameter_is_in_the_audit(ros2: Ros2Graph) -> None:
 
 def test_a_limit_that_is_broken_and_a_change_too_late_are_refused_in_words(ros2: Ros2Graph) -> None:
     node = "/late/my_camera"
-    ros2.node("camera", *FORWARD, name=node, ros=("-r", "__ns:=/late"))
+    ros2.node("camera", *VIRTUAL, name=node, ros=("-r", "__ns:=/late"))
     ask(ros2, node, "list_parameters")
     (result,) = ask(ros2, node, "set_parameters", {"name": "fps", "value": 20.0})["results"]
     assert result == {"successful": False, "reason": "fps cannot be set: it is only read when the node starts"}
@@ -112,7 +112,7 @@ def test_a_whole_number_does_for_a_double_and_entries_of_a_table_come_and_go(ros
 
 
 NODES = {
-    "camera": ("my_camera", FORWARD),
+    "camera": ("my_camera", VIRTUAL),
     "recognition": ("hand_sign_recognition", ()),
     "control": (NODE, ()),
     "robot": ("robot", ()),

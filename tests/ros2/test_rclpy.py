@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.contracts.node_contract import CMD_VEL, FORWARD, ODOM, RUN, expect_a_run_to_drive
+from tests.contracts.node_contract import CMD_VEL, ODOM, RUN, VIRTUAL, expect_a_run_to_drive
 from tests.contracts.ros2_node_contract import NODE, DdsDriver
 from tests.processes import eventually
 from tests.ros2.graph import NEEDS_ROS2, PYTHON, Ros2Graph
@@ -110,7 +110,7 @@ def test_a_run_drives_a_robot_by_rclpy(tmp_path: Path) -> None:
 
 
 def test_a_node_that_is_ended_leaves_at_once(ros2: Ros2Graph) -> None:
-    camera = ros2.node("camera", *FORWARD, name="/brief/my_camera", ros=("-r", "__ns:=/brief"))
+    camera = ros2.node("camera", *VIRTUAL, name="/brief/my_camera", ros=("-r", "__ns:=/brief"))
     camera.signal(signal.SIGINT)
     assert camera.code() == 0, camera.text
     assert "Traceback" not in camera.text

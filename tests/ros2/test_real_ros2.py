@@ -13,8 +13,8 @@ import pytest
 from tests.contracts.command_type_contract import CommandTypeContract, MakeRobot, Robot
 from tests.contracts.node_contract import (
     CMD_VEL,
-    FORWARD,
     ODOM,
+    VIRTUAL,
     ChainContract,
     Running,
 )
@@ -99,7 +99,7 @@ def test_every_type_of_the_graph_has_ros2s_own_hash(ros2: Ros2Graph) -> None:
     """ROS 2 tells the hashes of its own publishers, too."""
     ours = {"/image_raw": "Image", ODOM: "Odometry", "/robot_description": "String", CMD_VEL: "Twist"}
     ours |= {"/image_raw/compressed": "CompressedImage", "/clock": "Clock"}
-    ros2.node("camera", *FORWARD, name="/hashed/my_camera", ros=("-r", "__ns:=/hashed"))
+    ros2.node("camera", *VIRTUAL, name="/hashed/my_camera", ros=("-r", "__ns:=/hashed"))
     ros2.node("robot", name="/hashed/robot", ros=("-r", "__ns:=/hashed", "-p", "publish_clock:=true"))
     for topic, kind in ours.items():
         here = topic if topic == "/clock" else f"/hashed{topic}"
@@ -155,7 +155,7 @@ def test_pictures_of_a_ros2_camera_are_recognised(ros2: Ros2Graph) -> None:
     peer.ask("record", topic="/brain/gesture/hand_sign", type="String", fields=["data"])
     compressed = ("-p", "image_transport:=compressed")
     ros2.node("recognition", name="/brain/hand_sign_recognition", ros=("-r", "__ns:=/brain", *compressed))
-    ros2.node("camera", *FORWARD, name="/eye/my_camera", ros=("-r", "__ns:=/eye", *SCRIPT))
+    ros2.node("camera", *VIRTUAL, name="/eye/my_camera", ros=("-r", "__ns:=/eye", *SCRIPT))
     eventually(lambda: ["Forward"] in [values for _, values in peer.ask("get", topic="/brain/gesture/hand_sign")])
 
 
@@ -176,14 +176,14 @@ def test_compressed_pictures_reach_rclpy(ros2: Ros2Graph, reliable: bool) -> Non
 
 def test_raw_pictures_reach_an_rclpy_that_wants_them_reliable(ros2: Ros2Graph) -> None:
     ros2.peer.ask("record", topic="/sure/image_raw", type="Image", fields=["data"], depth=10)
-    ros2.node("camera", *FORWARD, name="/sure/my_camera", ros=("-r", "__ns:=/sure", *SCRIPT))
+    ros2.node("camera", *VIRTUAL, name="/sure/my_camera", ros=("-r", "__ns:=/sure", *SCRIPT))
     pictures = eventually(lambda: len(found := ros2.peer.ask("get", topic="/sure/image_raw")) >= 30 and found)
     assert {size for _, (size,) in pictures} == {320 * 240 * 3}
 
 
 def test_raw_images_for_fast_dds_are_warned_of(dds: Ros2Graph) -> None:
     dds.peer.ask("record", topic="/raw/image_raw", type="Image", fields=["width"], reliable=False, depth=1)
-    camera = dds.node("camera", *FORWARD, name="/raw/my_camera", ros=("-r", "__ns:=/raw"))
+    camera = dds.node("camera", *VIRTUAL, name="/raw/my_camera", ros=("-r", "__ns:=/raw"))
     line = "/raw/image_raw: /looker takes raw images"
     eventually(lambda: line in camera.text, what=line)
 
@@ -191,7 +191,7 @@ def test_raw_images_for_fast_dds_are_warned_of(dds: Ros2Graph) -> None:
 def test_what_a_node_logs_is_on_rosout(dds: Ros2Graph) -> None:
     """The log is latched: what was said before anybody listened is told, too."""
     dds.peer.ask("record", topic="/told/image_raw", type="Image", fields=["width"], depth=1, latched=True)
-    camera = dds.node("camera", *FORWARD, name="/told/my_camera", ros=("-r", "__ns:=/told"))
+    camera = dds.node("camera", *VIRTUAL, name="/told/my_camera", ros=("-r", "__ns:=/told"))
     eventually(lambda: "nothing passes" in camera.text)
     dds.peer.ask("record", topic="/rosout", type="Log", fields=["level", "name", "msg"], latched=True)
     said = ("told.my_camera", 30)
@@ -201,7 +201,7 @@ def test_what_a_node_logs_is_on_rosout(dds: Ros2Graph) -> None:
 
 def test_profiles_that_do_not_fit_are_said_in_words(dds: Ros2Graph) -> None:
     dds.peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5, latched=True)
-    camera = dds.node("camera", *FORWARD, name="/my_camera")
+    camera = dds.node("camera", *VIRTUAL, name="/my_camera")
     line = (
         "/image_raw: nothing passes between our publisher and the subscriber of /looker: "
         "the publisher is volatile, the subscriber wants transient local"

@@ -8,13 +8,14 @@ from pathlib import Path
 import pytest
 
 from handsteer.plugins.record.mcap_reader import McapFile
+from tests.contracts.node_contract import VIRTUAL
 from tests.processes import eventually
 from tests.ros2.graph import NEEDS_ROS2, Ros2Graph
 
 pytest.importorskip("cyclonedds")
 pytestmark = NEEDS_ROS2
 
-CAMERA = ("--headless", "--json", "--camera", "virtual", "--camera.width", "320", "--camera.height", "240")
+CAMERA = ("--headless", "--json", *VIRTUAL)
 FIELDS = {"TwistStamped": ["twist.linear.x", "header.stamp", "header.frame_id"], "Twist": ["linear.x"]}
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.contracts.node_contract import FORWARD
+from tests.contracts.node_contract import VIRTUAL
 from tests.contracts.ros2_node_contract import NODE
 from tests.dds.graph import ROS_VARIABLES
 from tests.distributed.network import NoNamespacesError, two_machines
@@ -57,7 +57,7 @@ def test_pictures_reach_reliable_and_best_effort_subscribers_on_another_machine(
     try:
         with two_machines(tmp_path) as (robot, workstation, link):
             link.shape(delay_s=0.005, loss=0.05)
-            words = robot.command(python, "-m", "handsteer", "camera", "--transport", transport, *FORWARD)
+            words = robot.command(python, "-m", "handsteer", "camera", "--transport", transport, *VIRTUAL)
             camera = Process(words, env, tmp_path / "camera.log")
             peers = [
                 Peer(workstation.command(str(PYTHON), str(PEER)), env, tmp_path / f"peer_{reliable}.log")

@@ -3,6 +3,7 @@
 import ast
 import importlib.util
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,8 @@ import yaml
 
 from handsteer.parameters import from_parameters
 from handsteer.plugins.ros2.arguments import parse_arguments
+from tests.dds.graph import free_domain
+from tests.processes import eventually
 
 PACKAGE = Path(__file__).resolve().parents[2] / "ros" / "handsteer_ros2"
 SECTIONS = {
@@ -108,6 +111,45 @@ def test_without_a_program_that_is_named_it_runs_in_ros2s_own_python(installed: 
     done = run(installed, *words, HANDSTEER="", PATH="/nowhere")
     assert done.returncode == 2
     assert "ROS parameter /hand_sign_control/linear_step: 7 should be less than or equal to 1" in done.stderr
+
+
+LAUNCH = """
+import os, subprocess, sys
+node = subprocess.Popen(sys.argv[1:], env={**os.environ, "HANDSTEER_LAUNCH": str(os.getpid())})
+print(node.pid, flush=True)
+node.wait()
+"""
+
+
+def has_ended(process: int) -> bool:
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(") ")[2][0] == "Z"
+    except FileNotFoundError:
+        return True
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells a process that its parent has ended")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_node_ends_with_the_launch_that_started_it(installed: Path, tmp_path: Path, number: signal.Signals) -> None:
+    """As ``ros2 launch`` that gets a signal which it does not handle."""
+    program, log = tmp_path / "handsteer", tmp_path / "log"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m handsteer "$@"\n')
+    program.chmod(0o755)
+    packages = next((installed / "lib").glob("python3*")) / "site-packages"
+    paths = f"{packages}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    environment = {**os.environ, "PYTHONPATH": paths, "HANDSTEER": str(program), "ROS_DOMAIN_ID": str(free_domain())}
+    words = [sys.executable, str(installed / "lib/handsteer_ros2/control"), "--transport", "dds"]
+    with log.open("wb") as file:
+        launch = subprocess.Popen(
+            [sys.executable, "-c", LAUNCH, *words], env=environment, stdout=subprocess.PIPE, stderr=file, text=True
+        )
+    assert launch.stdout is not None
+    node = int(launch.stdout.readline())
+    eventually(lambda: "is ready" in log.read_text(), what="the node")
+    launch.send_signal(number)
+    launch.wait(10)
+    eventually(lambda: has_ended(node), 20.0, "the node to end")
 
 
 def test_where_handsteer_is_not_installed_it_says_so(installed: Path) -> None:

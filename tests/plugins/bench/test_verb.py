@@ -1,9 +1,20 @@
+import contextlib
 import json
+import os
+import pty
+import subprocess
+import sys
+import termios
 from pathlib import Path
 
 import pytest
 
 from handsteer.cli import main
+from handsteer.plugins.bench import verb
+from handsteer.plugins.bench.cells import Cell, CellResult
+from handsteer.plugins.bench.courses import COURSES
+from handsteer.plugins.bench.laps import INTERFACES, Conditions, Lap
+from handsteer.plugins.bench.verb import bench_table
 
 
 def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
@@ -17,7 +28,9 @@ def test_a_table_json_and_plots(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     file, plots = tmp_path / "laps.json", tmp_path / "plots"
     options = ("--course", "stop-line", "--interface", "pad", "--seeds", "2", "--jobs", "1")
     code, out, err = run(capsys, *options, "--json", str(file), "--plots", str(plots))
-    assert (code, out.splitlines()[1].split()[:2]) == (0, ["stop-line", "pad"])
+    lines = out.splitlines()
+    assert (code, lines[0], lines[3].split()[0]) == (0, "stop-line, 2 laps each", "pad")
+    assert "%|" not in err, "there is no bar where nobody looks"
     assert [len(cell["laps"]) for cell in json.loads(file.read_text())] == [2]
     assert {path.name for path in plots.iterdir()} == {"stop-line-times.png", "stop-line-laps.png"}
     assert str(plots / "stop-line-laps.png") in err
@@ -27,8 +40,49 @@ def test_a_sweep_has_a_row_for_each_value(capsys: pytest.CaptureFixture[str], tm
     options = ("--course", "stop-line", "--interface", "pad", "--seeds", "1", "--jobs", "1")
     code, out, _ = run(capsys, *options, "--sweep", "latency=0,250", "--plots", str(tmp_path))
     assert code == 0
-    assert [line.split()[2] for line in out.splitlines()[1:]] == ["-", "+250"]
+    assert [line.split()[1] for line in out.splitlines()[3:5]] == ["-", "+250"]
     assert [path.name for path in tmp_path.iterdir()] == ["stop-line-latency.png"]
+
+
+def test_the_table_fits_a_terminal_and_its_words_are_explained() -> None:
+    laps = [Lap(seed, False, 180.0, 10, 10, 10, 10.00, 1.234, 1.234, 100.0, 1.0) for seed in range(2)]
+    conditions = [Conditions(), Conditions(through="pictures"), Conditions(latency_s=0.25), Conditions(reaction_s=0.4)]
+    cells = [Cell("warehouse", name, each) for name in INTERFACES for each in conditions]
+    lines = bench_table([CellResult(cell, tuple(laps)) for cell in cells]).splitlines()
+    assert max(map(len, lines)) <= 100
+    explained = {line.split()[0] for line in lines[-12:] if line}
+    assert set(lines[2].split()) - {"interface", "conditions"} <= explained
+
+
+def test_a_terminal_shows_how_much_is_left() -> None:
+    words = ["bench", "--course", "stop-line", "--interface", "pad", "--seeds", "2", "--jobs", "1"]
+    screen, end = pty.openpty()
+    termios.tcsetwinsize(end, (24, 100))
+    with subprocess.Popen(
+        [sys.executable, "-m", "handsteer", *words], stdout=subprocess.DEVNULL, stderr=end, stdin=subprocess.DEVNULL
+    ) as process:
+        os.close(end)
+        shown = b""
+        with contextlib.suppress(OSError):  # the terminal's end
+            while part := os.read(screen, 4096):
+                shown += part
+        assert process.wait() == 0
+    os.close(screen)
+    assert b"2 of 2 laps, 00:00 left" in shown
+
+
+def test_the_default_is_short_and_all_is_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[set[str], int]] = []
+
+    def note(cells: list[Cell], seeds: range, *_: object) -> list[CellResult]:
+        asked.append(({cell.course for cell in cells}, len(seeds)))
+        return []
+
+    monkeypatch.setattr(verb, "_drive", note)
+    monkeypatch.setattr(verb, "bench_table", str)
+    for options in ({}, {"all": True}, {"all": True, "seeds": 3, "course": ["maze"]}):
+        verb.bench(**options)
+    assert asked == [({"slalom"}, 5), (set(COURSES), 20), ({"maze"}, 3)]
 
 
 @pytest.mark.parametrize(

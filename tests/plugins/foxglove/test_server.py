@@ -36,7 +36,15 @@ from tests.plugins.foxglove.viewer import NEW, OLD, Viewer
 from tests.processes import eventually
 
 TOPICS = (HAND_SIGN, IMAGE_RAW, SCAN, ROBOT_DESCRIPTION)
-ON_DEMAND = ("/scan", "/image_raw/compressed", "/gesture/image_annotated", "/camera_info", "/gesture/joy")
+ON_DEMAND = (
+    "/scan",
+    "/image_raw/compressed",
+    "/gesture/image_annotated",
+    "/gesture/image_landmarks",
+    "/gesture/image_drawn",
+    "/camera_info",
+    "/gesture/joy",
+)
 
 
 @contextmanager

@@ -9,6 +9,9 @@ from pathlib import Path
 from playwright.sync_api import Browser, Playwright
 from scripts import chromium
 
+TILTS_UNASKED = "delete window.DeviceOrientationEvent?.requestPermission"
+"""Script that lets pages read how a phone is held as on Android: Chromium's shell asks, with no window to answer in."""
+
 _stack = ExitStack()
 atexit.register(_stack.close)
 
@@ -21,7 +24,7 @@ def a_browser(webcam: Path | None = None) -> Iterator[Browser]:
         webcam: The video that it takes for its webcam; such a browser is started for it alone.
     """
     if webcam is not None:
-        browser = chromium.launch(_playwright(), webcam)
+        browser = chromium.launch(_playwright(), webcam, sparing=True)
         try:
             yield browser
         finally:
@@ -58,4 +61,4 @@ def _playwright() -> Playwright:
 
 @cache
 def _shared() -> Browser:
-    return chromium.launch(_playwright())
+    return chromium.launch(_playwright(), sparing=True)

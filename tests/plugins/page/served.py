@@ -16,7 +16,7 @@ from handsteer.clock import RealClock
 from handsteer.config import DashboardConfig
 from handsteer.graph import Graph
 from handsteer.images import image_message
-from handsteer.messages import DIAGNOSTICS, IMAGE_ANNOTATED, Header
+from handsteer.messages import DIAGNOSTICS, IMAGE_DRAWN, IMAGE_LANDMARKS, Header
 from handsteer.nodes.steering import SteeringNode
 from handsteer.plugins.page.page_process import PageProcess
 from handsteer.plugins.page.remote_graph import GraphServer, RemoteGraph
@@ -48,14 +48,15 @@ def remote(graph: Graph) -> Iterator[RemoteGraph]:
 
 
 class Site:
-    """A page that is served, and a camera picture that is published as long as the site is."""
+    """A page that is served, and a camera picture, its drawing all black, that are published as long as the site is."""
 
     def __init__(self, **config: Any) -> None:
         self.clock = RealClock()
         self.transport = InProcessTransport()
         self.steering = SteeringNode(self.transport, self.clock)
         self.dashboard = Dashboard(self.transport, self.clock, self.steering, DashboardConfig(**{"port": 0, **config}))
-        self.pictures = self.transport.advertise("hand_sign_recognition", IMAGE_ANNOTATED)
+        self.pictures = self.transport.advertise("hand_sign_recognition", IMAGE_LANDMARKS)
+        self.drawings = self.transport.advertise("hand_sign_recognition", IMAGE_DRAWN)
         self.reports = self.transport.advertise("robot", DIAGNOSTICS)
         self.image: NDArray[np.uint8] = np.full((480, 640, 3), (40, 160, 220), np.uint8)
         self.url = self.dashboard.start()
@@ -68,6 +69,7 @@ class Site:
         while not self._ended.wait(0.02):
             header = Header(self.clock.stamp(self.clock.now()), "camera")
             self.pictures.publish(image_message(self.image, header))
+            self.drawings.publish(image_message(np.zeros_like(self.image), header))
 
     def get(self, path: str, **headers: str) -> http.client.HTTPResponse:
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)

@@ -4,7 +4,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, ViewportSize
 
-from tests.plugins.page.visits import NEEDS_A_BROWSER, visiting
+from tests.plugins.page.visits import NEEDS_A_BROWSER, each_when_there_is_time, visiting
 
 pytestmark = NEEDS_A_BROWSER
 
@@ -20,7 +20,7 @@ def faults(page: Page) -> list[str]:
     return [f"{fault['help']}: {node['html']}" for fault in found for node in fault["nodes"]]
 
 
-@pytest.mark.parametrize("path", ["/", "/world", "/teach", "/settings"])
+@pytest.mark.parametrize("path", ["/", "/world", *each_when_there_is_time("/teach", "/settings")])
 def test_a_page_is_there_for_all_in_light_and_dark_and_on_a_phone(path: str) -> None:
     with visiting("Forward:600", path, camera={"fps": 5}, robot={"world": "slalom"}) as visit:
         page = visit.page

@@ -2,9 +2,11 @@ from dataclasses import replace
 
 import pytest
 
+from handsteer.config import ControlConfig
 from handsteer.nodes.status import ControlStatus, RecognitionStatus
-from handsteer.plugins.page.first_visit import NOT_BEGUN, refusal, steps_done
-from handsteer.plugins.page.state import Observed, compose
+from handsteer.plugins.page.first_visit import NOT_BEGUN, OFFERED_S, driven_s, refusal, steps_done
+from handsteer.plugins.page.observed import Observed
+from handsteer.plugins.page.state import compose
 from handsteer.types import Velocity
 
 IDLE = compose(Observed(), 0.0)
@@ -36,6 +38,20 @@ def test_what_was_steered_by_hand_is_not_a_step_by_signs() -> None:
         )
         == 1
     )
+
+
+def test_a_minute_of_driving_by_the_tutorial_s_rule_counts_and_nothing_else() -> None:
+    drives = replace(IDLE, control=BY_SIGNS, mood="driving", rule=ControlConfig())
+    assert driven_s(0.0, drives, 0.5) == 0.5
+    assert driven_s(0.0, drives, 500.0) == 1.0, "the page was asleep"
+    assert driven_s(OFFERED_S, IDLE, 0.5) == OFFERED_S
+    others = (
+        replace(drives, mood="standing"),
+        replace(drives, control=ControlStatus(source="steering")),
+        replace(drives, rule=ControlConfig(rule="point")),
+        replace(drives, rule=None),
+    )
+    assert [driven_s(3.0, state, 0.5) for state in others] == [3.0] * len(others)
 
 
 @pytest.mark.parametrize(

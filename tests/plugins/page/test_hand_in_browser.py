@@ -14,7 +14,7 @@ from handsteer.nodes.status import ControlStatus, RecognitionStatus
 from tests.plugins.page.browsers import a_browser
 from tests.plugins.page.served import Site
 from tests.plugins.page.test_accessibility import faults
-from tests.plugins.page.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
+from tests.plugins.page.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, each_when_there_is_time, visiting
 
 pytestmark = NEEDS_A_BROWSER
 
@@ -103,7 +103,7 @@ def test_nothing_is_said_of_engaging_with_a_simulated_robot_and_the_mode_is_swit
         assert visit.troubles == []
 
 
-@pytest.mark.parametrize("handedness", ["Right", "Left"])
+@pytest.mark.parametrize("handedness", ["Right", *each_when_there_is_time("Left")])
 def test_the_hand_drives_as_a_joystick_and_the_picture_shows_the_stick(handedness: str) -> None:
     with visiting(
         # Often, for a busy machine: a pause in the frames ends the hold until the hand is opened again.

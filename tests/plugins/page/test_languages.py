@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handsteer.parameters import section_model
 from handsteer.plugins.page.elements import STATIC
-from handsteer.plugins.page.page import LANGUAGES, preferred_language
+from handsteer.plugins.page.languages import LANGUAGES, preferred_language
 from handsteer.plugins.page.settings_fields import FIELDS, SECTION_TITLES
 from handsteer.types import EFFECTS, SIGNS
 
@@ -72,4 +73,5 @@ def test_parameters_signs_and_effects_are_translated(language: str) -> None:
     shown = [f"{field.text}." for field in FIELDS.values()]
     shown += [field.title for field in FIELDS.values()]
     shown += [*SECTION_TITLES.values(), *SIGNS, *EFFECTS.values()]
+    shown += sorted({(section_model(field.section).__doc__ or "").partition("\n")[0] for field in FIELDS.values()})
     assert [words for words in shown if not is_known(words, language)] == []

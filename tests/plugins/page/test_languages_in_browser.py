@@ -3,8 +3,8 @@
 import pytest
 
 from tests.plugins.page.test_accessibility import faults
-from tests.plugins.page.test_layout_in_browser import DESKTOP, PHONE, fits, rows_have_room, stop_is_in_view_wherever
-from tests.plugins.page.visits import NEEDS_A_BROWSER, Visit, visiting
+from tests.plugins.page.test_layout_in_browser import fits, rows_have_room, stop_is_in_view_wherever
+from tests.plugins.page.visits import DESKTOP, NEEDS_A_BROWSER, PHONE, Visit, visiting
 
 pytestmark = NEEDS_A_BROWSER
 

@@ -1,7 +1,8 @@
 from handsteer.config import ControlConfig
 from handsteer.nodes.status import ControlStatus, RecognitionStatus, Status
 from handsteer.plugins.page.legend import active_entry, bars_of, joystick_legend, legend
-from handsteer.plugins.page.state import Observed, PageState, Report, compose
+from handsteer.plugins.page.observed import Observed, Report
+from handsteer.plugins.page.state import PageState, compose
 from handsteer.types import SIGNS, Velocity
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from playwright.sync_api import Locator
+from playwright.sync_api import Locator, ViewportSize
 
 from handsteer.cameras import freshness
 from handsteer.cameras.files import video_frames
@@ -18,12 +18,13 @@ from handsteer.plugins.teach.exchange import LARGEST_SHARED_BYTES
 from handsteer.plugins.teach.onnx_file import as_onnx
 from handsteer.recognition.custom_signs import load_custom_model
 from tests.plugins.page.test_accessibility import faults
-from tests.plugins.page.visits import NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
+from tests.plugins.page.visits import IN_LANGUAGES_AND_SIZES, NEEDS_A_BROWSER, PATIENCE_MS, Visit, visiting
 
 pytestmark = NEEDS_A_BROWSER
 
 TRAINING_MS = 5 * PATIENCE_MS
 EMPTY_FRAMES = 60
+MOST_CLICKS = 8
 
 
 @pytest.fixture
@@ -105,6 +106,7 @@ def test_a_sign_is_taught_from_the_browsers_webcam_and_drives(
     patient: dict[str, Any] = {"signs": {"max_frame_age": 2.0, "dropout_hold": 1.0}, "control": {"sign_timeout": 2.0}}
     with visiting("NONE:600", "/teach", webcam=two_fingers, teach=plan, **patient) as visit:
         visit.page.get_by_role("button", name="Use my camera").click()
+        visit.wait_until(lambda: visit.graph.cameras.browser.is_given)  # its first picture moves the cards
         card = begin(visit, "Zwei")
         teach(visit, card)
         keep(visit, card, tmp_path)
@@ -114,6 +116,62 @@ def test_a_sign_is_taught_from_the_browsers_webcam_and_drives(
     with visiting("Peace:600", "/teach", teach={**plan, "dataset": tmp_path / "b.npz"}) as visit:
         (tmp_path / "mine.npz").unlink()
         use_file(visit, tmp_path / "shared.npz")
+
+
+GERMAN = {
+    "Use my camera": "Meine Kamera nutzen",
+    "Teach": "Lehren",
+    "Start a lesson": "Lektion beginnen",
+    "Name of the sign": "Name des Zeichens",
+    "2 timed takes": "2 Aufnahmen mit Timer",
+    "Train": "Trainieren",
+    "forward": "vorwärts",
+    "Keep and drive": "Behalten und fahren",
+    "Reset": "Zurücksetzen",
+}
+COUNT_CLICKS = (
+    "addEventListener('click', (event) => { if (event.isTrusted) "
+    "sessionStorage.setItem('clicks', 1 + Number(sessionStorage.getItem('clicks'))); }, true)"
+)
+
+
+LANGUAGES = {"en-US": {words: words for words in GERMAN}, "de-DE": GERMAN}
+
+
+@pytest.mark.parametrize(("locale", "size"), IN_LANGUAGES_AND_SIZES)
+def test_a_teachers_sign_drives_in_eight_clicks(
+    locale: str, size: ViewportSize, two_fingers: Path, plan: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = LANGUAGES[locale]
+    monkeypatch.setattr(freshness, "_PICTURES", 8)
+    patient: dict[str, Any] = {"signs": {"max_frame_age": 2.0, "dropout_hold": 1.0}, "control": {"sign_timeout": 2.0}}
+    with visiting("NONE:600", webcam=two_fingers, locale=locale, teach=plan, **patient) as visit:
+        page, robot = visit.page, visit.graph.robot
+        page.set_viewport_size(size)
+        page.add_init_script(COUNT_CLICKS)
+        page.evaluate(COUNT_CLICKS)
+
+        def click(name: str) -> None:
+            page.get_by_role("button", name=words[name], exact=True).first.click()
+
+        click("Use my camera")
+        page.get_by_role("link", name=words["Teach"], exact=True).click()
+        click("Start a lesson")
+        page.get_by_label(words["Name of the sign"]).fill("Zwei")
+        page.get_by_label(words["Name of the sign"]).press("Enter")
+        page.locator(".class.own").nth(1).wait_for()  # next to that of the background
+        click("2 timed takes")
+        page.locator(".class.own").first.locator(".take").nth(1).wait_for()
+        click("Train")
+        page.locator(".recalls li", has_text="Zwei").wait_for(timeout=TRAINING_MS)
+        click("forward")
+        click("Keep and drive")
+        page.locator(".sign-tile", has_text="Zwei").wait_for()
+        page.locator(".banner").get_by_role("button", name=words["Reset"]).click()  # its label says more
+        visit.wait_until(lambda: robot.state.linear_mps > 0.02 and "Zwei" in visit.text(".banner"))
+        assert int(page.evaluate("sessionStorage.getItem('clicks')")) <= MOST_CLICKS
+        assert visit.graph.config.control.actions == {"Zwei": "forward"}
+        assert visit.troubles == []
 
 
 def teach(visit: Visit, card: Locator) -> None:
@@ -141,8 +199,9 @@ def keep(visit: Visit, card: Locator, folder: Path) -> None:
     page, graph = visit.page, visit.graph
     page.locator(".recalls li", has_text="Two").wait_for(timeout=TRAINING_MS)
     visit.wait_until(lambda: percent(card) >= 80 and visit.text(".opinion .sign").startswith("Two"))
-    card.get_by_label("What it does").click()
-    page.get_by_role("option", name="turn left").click()
+    press(visit, "Keep")
+    page.locator(".tools .message", has_text="Choose first what the robot does at Two").wait_for()
+    card.get_by_role("button", name="turn left", exact=True).click()
     visit.wait_until(lambda: "turns faster to the left" in visit.text(".opinion"))
     assert graph.config.signs.model is None, "nothing is in use before it is kept"
     with page.expect_download() as download:
@@ -163,6 +222,7 @@ def keep(visit: Visit, card: Locator, folder: Path) -> None:
     page.get_by_role("button", name="Reset").click()
     page.locator(".tools .message", has_text="stands until the lesson is over").wait_for()
     assert visit.text(".banner .headline") == "Stopped"
+    assert visit.text(".banner .reason") == "For the lesson, until you reset it"
     press(visit, "End the lesson")
     page.locator(".taught .tile", has_text="Two").locator("svg.landmarks").wait_for()
 
@@ -213,6 +273,7 @@ def use_file(visit: Visit, file: Path) -> None:
     card = page.locator(".class.own").first
     card.get_by_role("heading", name="Two").wait_for()
     page.locator(".tools .message", has_text="try them, then keep them").wait_for()
+    card.get_by_role("button", name="turbo", exact=True).click()
     press(visit, "Keep")
     page.locator(".tools .message", has_text="Kept, and in use").wait_for()
     assert load_custom_model(file.with_name("mine.npz")).labels == ("Two",)

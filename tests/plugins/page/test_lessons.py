@@ -146,10 +146,12 @@ def test_a_sign_is_collected_learnt_kept_and_taken_by_the_graph(school: School) 
 
     with pytest.raises(ConfigError, match="'fly' is not a valid action: choose one of forward"):
         lessons.save("ann", {"peace": "fly"})
+    with pytest.raises(ConfigError, match="choose first what the robot does at Call"):
+        lessons.save("ann", {"peace": "turbo"})
     lessons.save("ben", {"peace": "turbo"})
     school.refuses = True
     with pytest.raises(ConfigError, match="refused"):
-        lessons.save("ann", {"peace": "turbo"})
+        lessons.save("ann", {"peace": "turbo", "Call": "go"})
     assert (school.folder / "signs.npz").read_bytes() == before
     school.refuses = False
     lessons.save("ann", {"peace": "turbo", "Call": "go"})
@@ -166,6 +168,7 @@ def test_a_sign_is_collected_learnt_kept_and_taken_by_the_graph(school: School) 
     assert not lessons.share("ben", shared)
     dataset, shared_model = load_shared(shared)
     assert (len(dataset.takes), shared_model is not None) == (4, True)
+    assert lessons.chosen_action("Call", lesson.state) == "go", "it is in use"
     lessons.save("ann", {"peace": "stop"})
     assert school.config.control.actions == {"peace": "stop"}, "an action changes without another training"
     lessons.end("ann")

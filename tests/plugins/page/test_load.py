@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from handsteer.messages import DiagnosticArray, DiagnosticStatus, Header, KeyValue
-from handsteer.plugins.page.camera import BYTES_PER_S
+from handsteer.plugins.page.pictures import BYTES_PER_S
 from tests.plugins.page.network import Relay, client_of, deaf, deaf_page, send_frame
 from tests.plugins.page.served import PATIENCE_S, Site
 from tests.plugins.page.test_server import read_jpeg, viewer

@@ -345,6 +345,21 @@ def test_tells_each_viewer_who_steers_and_who_stopped(bench: Bench) -> None:
     assert bench.node.state("me").viewers.stopped == ""
 
 
+def test_what_the_page_stops_the_robot_for_is_not_said_to_be_the_viewers_stop(bench: Bench) -> None:
+    bench.report(ControlStatus(Reason("stopped"), stopped=True))
+    bench.node.halt("me", "the lesson")
+    assert bench.node.state("me").reason == "for the lesson, until you reset it"
+    bench.node.halt("me")
+    assert bench.node.state("me").reason == "by you, until you reset it"
+
+
+def test_a_stop_that_others_have_reset_is_not_laid_to_who_stopped_before(bench: Bench) -> None:
+    bench.node.halt("me")
+    for is_stopped in (True, False, True):
+        bench.report(ControlStatus(Reason("stopped"), stopped=is_stopped))
+    assert bench.node.state("me").reason == "until you reset it"
+
+
 def test_who_has_just_let_go_is_who_steered_until_the_control_has_noticed(bench: Bench) -> None:
     bench.node.steer("me", 0.1, 0.0)
     bench.node.release("me")

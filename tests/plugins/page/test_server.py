@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.errors import DashboardError
-from handsteer.plugins.page.camera import next_quality, shrink
+from handsteer.plugins.page.pictures import next_quality, shrink
 from tests.plugins.page.served import PATIENCE_S, Site
 
 

@@ -1,5 +1,6 @@
 """The page of the settings in a real browser, on the whole graph with the virtual hand."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -93,6 +94,10 @@ def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkey
         page.get_by_label("Set control.max_linear to its default").click()
         expect(of(page, "control.max_linear")).to_have_value("0.306")
         expect(row(page, "robot.preset")).to_contain_text("default none")
+        page.get_by_role("button", name="Set all parameters to their defaults").click()
+        page.get_by_role("button", name="Set all to default").click()
+        expect(page.locator(".said")).to_have_text("all is as by default; not saved")
+        expect(row(page, "camera.fps")).not_to_have_class(re.compile(r"\bchanged\b"))
         for width, height in ((1440, 900), (390, 844), (360, 740)):
             page.set_viewport_size({"width": width, "height": height})
             assert page.evaluate("document.documentElement.scrollWidth") <= width

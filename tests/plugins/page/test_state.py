@@ -10,17 +10,9 @@ from handsteer.config import ControlConfig
 from handsteer.control import Source
 from handsteer.control.explain import Reason
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
-from handsteer.plugins.page.state import (
-    STALE_S,
-    Observed,
-    Report,
-    Reporting,
-    Viewers,
-    compose,
-    explain,
-    frame_rate,
-)
-from handsteer.plugins.page.status_bar import spoken
+from handsteer.plugins.page.observed import STALE_S, Observed, Report, Reporting, Viewers
+from handsteer.plugins.page.state import compose, explain, frame_rate
+from handsteer.plugins.page.status_bar import Notable, spoken
 from handsteer.plugins.page.steer_panel import mux_inputs
 from handsteer.plugins.page.steering_input import read_deflection, read_number
 from handsteer.types import SIGNS, ZERO, Velocity
@@ -199,7 +191,9 @@ def test_knows_nothing_before_anything_has_come() -> None:
 
 def test_says_why_there_is_no_picture() -> None:
     silent = RecognitionStatus(no_frame_s=3.0)
-    assert compose(observed(silent, CAMERA), now_s=0.1).no_picture == "no frame for 3.0 s"
+    assert compose(observed(silent, CAMERA), now_s=0.1).no_picture == (
+        "no frame for 3.0 s: connect the camera again, or choose another"
+    )
     assert compose(observed(silent, UNPLUGGED), now_s=0.1).no_picture == "/dev/video0 was unplugged"
 
 
@@ -258,11 +252,50 @@ STOPPED = ControlStatus(Reason("stopped"), stopped=True)
         (Viewers(stopped="you"), "by you, until you reset it"),
         (Viewers(stopped="you", may_reset=False), "by you, until the driver resets it"),
         (Viewers(stopped="another viewer"), "by another viewer, until you reset it"),
+        (Viewers(stopped="you", stopped_for="the lesson"), "for the lesson, until you reset it"),
+        (Viewers(stopped_for="the lap", may_reset=False), "for the lap, until the driver resets it"),
     ],
 )
 def test_says_who_stopped_the_robot_and_who_may_reset_it(viewers: Viewers, says: str) -> None:
     assert explain(reporting(STOPPED), viewers) == ("trouble", "Stopped", says)
     assert compose(observed(STOPPED), 0.1, viewers).stopped
+
+
+def test_that_it_is_stopped_is_said_once() -> None:
+    state = compose(observed(STOPPED), 0.1, Viewers(stopped="you"))
+    assert (state.headline, state.reason) == ("Stopped", "by you, until you reset it")
+
+
+@pytest.mark.parametrize(
+    ("status", "seen", "reason"),
+    [
+        (control(Reason("steered_at_zero"), source="steering"), NO_HAND, "steered directly"),
+        (control(Reason("held"), source="joystick"), NO_HAND, "driven by the hand as a joystick"),
+        (control(NO_SIGN), RecognitionStatus("Forward", seen="Forward"), "Forward"),
+    ],
+)
+def test_beside_a_command_to_drive_an_older_report_does_not_say_that_it_stands(
+    status: ControlStatus, seen: RecognitionStatus, reason: str
+) -> None:
+    since = {"command": Velocity(0.5, 0.0), "command_came_s": 0.05, "measured": Velocity(0.4, 0.0)}
+    state = compose(observed(status, seen, measured_came_s=0.05, **since), 0.1)
+    assert (state.headline, state.reason, state.commanded) == ("Driving", reason, Velocity(0.5, 0.0))
+
+
+def test_an_older_or_foreign_command_does_not_outdo_the_report() -> None:
+    steered = control(Reason("steered_at_zero"), source="steering")
+    older = observed(steered, NO_HAND, command=Velocity(0.5, 0.0), command_came_s=-0.05)
+    newer: dict[str, Any] = {"command": Velocity(0.5, 0.0), "command_came_s": 0.05}
+    rivals = observed(replace(steered, warning="two nodes command the robot"), NO_HAND, **newer)
+    silent = observed(control(NO_SIGN), RecognitionStatus("Stop", seen="Stop"), **newer)
+    for each in (older, rivals, silent):
+        assert compose(each, 0.1).headline == "Standing"
+    assert compose(observed(STOPPED, NO_HAND, **newer), 0.1).headline == "Stopped"
+
+
+def test_without_frames_it_says_what_to_do() -> None:
+    state = compose(observed(control(NO_SIGN), RecognitionStatus(no_frame_s=12.0), CAMERA), 0.1)
+    assert state.reason == "no frame for 12.0 s: connect the camera again, or choose another"
 
 
 def test_steering_past_the_control_is_said_whatever_the_control_says() -> None:
@@ -388,3 +421,17 @@ def test_a_screen_reader_is_not_told_each_tenth_of_a_second() -> None:
         return spoken(compose(observed(control(NO_SIGN), CAMERA, seen), 0.1))
 
     assert said(0.4) == said(12.0) == "Standing: no hand seen"
+
+
+def test_the_most_important_news_is_told() -> None:
+    waits, ready, forward = Notable(False, False, "NONE"), Notable(False, True, "NONE"), Notable(False, True, "Forward")
+    stopped = Notable(True, False, "NONE")
+    assert ready.news_since(waits) == ("ready", "Ready for signs")
+    assert Notable(False, True, "Stop").news_since(waits) == ("ready", "Ready for signs")
+    assert forward.news_since(ready) == ("sign", "Sign accepted: Forward")
+    assert stopped.news_since(forward) == ("stopped", "Stopped")
+    assert [now.news_since(before) for now, before in ((waits, stopped), (ready, forward), (forward, forward))] == [
+        None,
+        None,
+        None,
+    ]

@@ -161,7 +161,10 @@ def test_sliders_of_who_watches_do_nothing(visit: Visit) -> None:
 
 
 def test_another_topic_is_steered_past_the_control_and_stops_as_well() -> None:
-    sections = {"virtual_hand": {"script": "NONE:600"}, "camera": {"source": "virtual", "width": 320, "height": 240}}
+    sections = {
+        "virtual_hand": {"script": "NONE:600"},
+        "camera": {"source": "virtual", "width": 320, "height": 240, "fps": 15},
+    }
     config = load(None, {**sections, "dashboard": {"port": 0}})
     with Graph(config) as graph, a_browser() as browser:
         topic = cmd_vel_topic(config)

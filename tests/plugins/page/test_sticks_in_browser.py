@@ -8,6 +8,7 @@ from playwright.sync_api import Page
 
 from handsteer.config import JoystickConfig
 from handsteer.recognition.hand_joystick import deflection
+from tests.plugins.page.browsers import TILTS_UNASKED
 from tests.plugins.page.visits import NEEDS_A_BROWSER, Visit, visiting
 
 pytestmark = NEEDS_A_BROWSER
@@ -147,8 +148,7 @@ def phone(visit: Visit, script: str = "") -> Iterator[Page]:
     assert browser is not None
     page = browser.new_page(viewport={"width": 390, "height": 740}, has_touch=True, is_mobile=True)
     page.on("pageerror", lambda error: visit.troubles.append(str(error)))
-    if script:
-        page.add_init_script(script)
+    page.add_init_script(f"{TILTS_UNASKED}; {script}")
     page.goto(visit.page.url)
     page.get_by_role("button", name="Ask to drive").click()
     visit.page.get_by_role("button", name="Hand over").click()

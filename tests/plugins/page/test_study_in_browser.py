@@ -239,8 +239,9 @@ def test_only_the_input_of_the_condition_drives(tmp_path: Path) -> None:
     plan = a_plan(
         participants=1, conditions=[{"name": way, "input": way} for way in ways], forms=[], practice_laps=0, laps=1
     )
-    with visiting("NONE:600", "/study", study=a_task(tmp_path, plan), camera={"fps": 5}) as visit:
+    with visiting("NONE:600", "/", study=a_task(tmp_path, plan), camera={"fps": 5}) as visit:
         page, state = visit.page, visit.graph.robot
+        assert page.locator("nav.links a").count() == 0, "a participant gets the study only"
         page.evaluate(PLUG_IN, [])
         page.get_by_role("button", name="I agree").click()
         for number, way in enumerate(order_of(plan, "P01")[0], 1):

@@ -5,14 +5,14 @@ from typing import Any
 
 import pytest
 
-from tests.plugins.page.visits import NEEDS_A_BROWSER, visiting
+from tests.plugins.page.visits import NEEDS_A_BROWSER, each_when_there_is_time, visiting
 
 pytestmark = NEEDS_A_BROWSER
 
 _ENOUGH = 12
 
 
-@pytest.mark.parametrize("path", ["/", "/world", "/teach", "/settings", "/study"])
+@pytest.mark.parametrize("path", ["/", "/settings", *each_when_there_is_time("/world", "/teach", "/study")])
 def test_only_what_has_changed_is_sent(path: str) -> None:
     with visiting("Forward:2 Stop:1", camera={"fps": 10}) as visit:
         page = visit.page

@@ -2,13 +2,14 @@
 
 import csv
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import cv2
 import pytest
 from playwright.sync_api import Browser, Page
 
+from handsteer.cameras import freshness
 from handsteer.config import load
 from handsteer.graph import Graph
 from handsteer.types import FORWARD, STOP
@@ -33,10 +34,14 @@ def recording(slideshow: Path, signs: tuple[str, ...], path: Path) -> Path:
 
 
 @pytest.fixture
-def graph() -> Iterator[Graph]:
+def graph(monkeypatch: pytest.MonkeyPatch) -> Iterator[Graph]:
+    monkeypatch.setattr(freshness, "_PICTURES", 8)  # the webcam's clip is short, and repeats
     hand = {
         "camera": {"source": "virtual", "width": 320, "height": 240, "fps": 15},
         "virtual_hand": {"script": "NONE:60"},
+        # A machine that draws the world in software, and has little time, is slow to send its camera's frames.
+        "signs": {"max_frame_age": 2.0, "dropout_hold": 1.0},
+        "control": {"sign_timeout": 2.0},
     }
     config = load(base={**hand, "dashboard": {"port": 0}})
     with Graph(config, steering=False) as graph:
@@ -93,34 +98,35 @@ def test_the_browsers_webcam_drives_until_its_page_is_closed(graph: Graph, url: 
     wait_for_words(second, ".banner", "No hand seen for")
 
 
-def wait_until_stands(graph: Graph) -> None:
+def wait_until(condition: Callable[[], bool], otherwise: str) -> None:
     waiting = threading.Event()
-    for _ in range(PATIENCE_MS // 50):
-        if graph.robot.state.linear_mps == pytest.approx(0, abs=0.01):
+    for _ in range(PATIENCE_MS // 20):
+        if condition():
             return
-        waiting.wait(0.05)
-    pytest.fail("the robot drives on")
+        waiting.wait(0.02)
+    pytest.fail(otherwise)
+
+
+def wait_until_stands(graph: Graph) -> None:
+    wait_until(lambda: graph.robot.state.linear_mps == pytest.approx(0, abs=0.01), "the robot drives on")
 
 
 def test_ones_own_camera_begins_at_the_start_and_not_where_the_demo_left_the_robot(browser: Browser) -> None:
     hand = {"camera": {"source": "virtual", "width": 320, "height": 240, "fps": 15}}
-    config = load(base={**hand, "virtual_hand": {"script": "Forward:4 NONE:600"}, "dashboard": {"port": 0}})
+    config = load(base={**hand, "virtual_hand": {"script": "Forward:4 NONE:4"}, "dashboard": {"port": 0}})
     page = page_process()
     try:
         with Graph(config, steering=False) as graph:
             url = page.serve(graph)
             graph.start()
             shown = show(browser, url)
-            wait_for_words(shown, ".banner", "No hand seen for")
-            wait_until_stands(graph)
-            assert graph.robot.state.truth.x > 0.2
+            # The demo shows it again and again: a machine that is busy may stop the robot before it has come far.
+            wait_until(lambda: graph.robot.state.truth.x > 0.2, "the robot has not left the start")
             shown.get_by_role("button", name="Use my camera").click()
-            waiting = threading.Event()
-            for _ in range(PATIENCE_MS // 20):
-                if graph.cameras.source == "browser" and graph.robot.state.truth.x < 0.1:
-                    return
-                waiting.wait(0.02)
-            pytest.fail(f"the robot is still at {graph.robot.state.truth.x:.2f} m")
+            wait_until(
+                lambda: graph.cameras.source == "browser" and graph.robot.state.truth.x < 0.1,
+                "the robot is still where the demo left it",
+            )
     finally:
         page.stop()
 
@@ -134,10 +140,10 @@ def test_only_who_drives_gives_a_camera(graph: Graph, url: str, browser: Browser
     wait_for_words(first, ".camera .sign", "Forward")
     viewer = second.evaluate("window.clientId")
     second.evaluate("viewer => giveCamera(viewer)", viewer)
-    wait_for_words(second, ".camera .trouble", "only the driver can share a camera")
+    wait_for_words(second, ".offer .trouble", "only the driver can share a camera")
     second.get_by_role("button", name="Ask to drive").click()
     first.get_by_text("Hand over").click()
-    wait_for_words(first, ".camera .trouble", "another viewer drives now")
+    wait_for_words(first, ".offer .trouble", "another viewer drives now")
     second.evaluate("viewer => giveCamera(viewer)", viewer)
     wait_for_words(second, ".camera .sign", "Forward")
 
@@ -146,7 +152,7 @@ def test_a_browser_without_a_webcam_says_so(url: str) -> None:
     with a_browser() as browser:
         page = show(browser, url)
         page.get_by_role("button", name="Use my camera").click()
-        wait_for_words(page, ".camera .trouble", "Plug one in, or open this page on a phone")
+        wait_for_words(page, ".offer .trouble", "Plug one in, or open this page on a phone")
 
 
 STILL_CAMERA = """

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 
 from handsteer.errors import WorldError
@@ -5,8 +7,8 @@ from handsteer.plugins.page.world_desk import MOST_STEPS, History
 from handsteer.plugins.page.world_editor import LARGEST_FILE_BYTES, read_file
 from handsteer.plugins.page.world_plan import bounds, union
 from handsteer.robots import Shape
-from handsteer.robots.editing import add, add_gate, edit, numeric_properties
-from handsteer.robots.world import World, load_world
+from handsteer.robots.editing import add, add_gate, edit, numeric_properties, rename
+from handsteer.robots.world import World, load_world, named_by_file, parse_world, write_world
 from handsteer.types import Pose2D
 
 START = Pose2D(0.0, 0.0, 0.0)
@@ -41,8 +43,9 @@ def test_each_figure_changes_itself_and_nothing_else(shape: Shape) -> None:
 
 
 def test_undo_and_redo_go_through_the_worlds_and_forget_what_others_have_changed() -> None:
-    empty, one = (World(), "empty"), (add(World(), "box", START), "empty")
-    two = (add(one[0], "box", START), "mine")
+    empty = World(name="empty")
+    one = add(empty, "box", START)
+    two = rename(add(one, "box", START), "mine")
     history = History()
     history.note(empty, one)
     history.note(one, two)
@@ -52,14 +55,14 @@ def test_undo_and_redo_go_through_the_worlds_and_forget_what_others_have_changed
     assert (history.to(-1), history.to(1)) == (None, one)
     history.go(1)
     assert (history.to(-1), history.to(1)) == (empty, two)
-    history.follow((add(one[0], "sphere", START), "empty"))
+    history.follow(add(one, "sphere", START))
     assert (history.to(-1), history.to(1)) == (None, None)
 
 
 def test_only_the_last_changes_can_be_undone() -> None:
-    history, world = History(), (World(), "empty")
+    history, world = History(), World()
     for number in range(MOST_STEPS + 5):
-        after = (add_gate(World(), (number, 0.5), (number, -0.5)), "empty")
+        after = add_gate(World(), (number, 0.5), (number, -0.5))
         history.note(world, after)
         world = after
     steps = 0
@@ -74,3 +77,14 @@ def test_the_plan_shows_all_of_a_world_with_a_margin() -> None:
     ends = [point for gate in load_world("slalom").gates for point in (gate.left, gate.right)]
     assert all(x + 0.5 < at_x < x + width - 0.5 and y + 0.5 < at_y < y + height - 0.5 for at_x, at_y in ends)
     assert union((0, 0, 1, 1), (-1, 0.5, 1, 2)) == (-1, 0, 2, 2.5)
+
+
+def test_a_world_has_a_name_that_it_keeps_in_its_file() -> None:
+    world = rename(load_world("slalom"), "  Mein  Kurs: 2 ")
+    assert (load_world("slalom").name, world.name) == ("slalom", "Mein Kurs: 2")
+    assert parse_world(write_world(world), "other.yaml") == world
+    assert named_by_file(parse_world("floor: {}", "other"), Path("folder/other.yaml")).name == "other"
+    assert named_by_file(world, Path("folder/other.yaml")) == world
+    for wrong in ("", " ", "x" * 61, "a\x07b"):
+        with pytest.raises(WorldError, match="is not a valid name for a world"):
+            rename(world, wrong)

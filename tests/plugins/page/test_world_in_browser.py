@@ -173,7 +173,8 @@ def editing(world: object) -> Iterator[Visit]:
     """Show the editor with ``world``."""
     with visiting("NONE:600", "/world", camera={"fps": 5}, robot={"world": str(world)}) as visit:
         visit.page.set_viewport_size({"width": 1440, "height": 900})
-        visit.page.locator(".bar .name", has_text=Path(str(world)).name).wait_for()
+        name = visit.page.get_by_label("Name of the world")
+        visit.wait_until(lambda: name.input_value() == Path(str(world)).stem)
         yield visit
 
 
@@ -229,12 +230,16 @@ def test_things_are_added_dragged_changed_deleted_saved_and_loaded(tmp_path: Pat
         )  # it says what is, not what was refused
 
         page.locator(".saved", has_text="unsaved changes").wait_for()
+        page.get_by_label("Name of the world").fill("My course")
+        page.get_by_label("Name of the world").press("Enter")
+        visit.wait_until(lambda: robot.world is not None and robot.world.name == "My course")
+        visit.wait_until(lambda: "My course" in visit.text(".files .q-select"))
         with page.expect_download() as download:
             press(page, "Save file")
         page.locator(".saved", has_text="no unsaved changes").wait_for()
         path = tmp_path / download.value.suggested_filename
         download.value.save_as(path)
-        assert path.name == "empty.yaml"
+        assert path.name == "My course.yaml"
         assert read_world(path) == robot.world
         saved = robot.world
         page.get_by_role("button", name="Delete the chosen").click()
@@ -289,11 +294,11 @@ def test_walls_and_gates_are_drawn_undone_and_made_again() -> None:
         page.get_by_role("option", name="slalom").click()
         page.get_by_role("button", name="Load the chosen world").click()
         visit.wait_until(lambda: robot.world == load_world("slalom"))
-        page.locator(".bar .name", has_text="slalom").wait_for()
+        visit.wait_until(lambda: page.get_by_label("Name of the world").input_value() == "slalom")
         visit.wait_until(lambda: page.locator(".plan .gate").count() == 8)
         page.get_by_label("Undo the last change").click()  # what was not saved is not lost
         visit.wait_until(lambda: names() == ["wall 1", "gate 1"])
-        page.locator(".bar .name", has_text="empty").wait_for()
+        visit.wait_until(lambda: page.get_by_label("Name of the world").input_value() == "empty")
         page.get_by_label("Make the change again").click()
         visit.wait_until(lambda: page.locator(".plan .gate").count() == 8)
         page.get_by_label("Show the whole world").click()

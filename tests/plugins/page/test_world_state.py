@@ -18,6 +18,7 @@ from handsteer.plugins.page.world_state import (
     Sample,
     Trail,
     VelocityHistory,
+    arc_points,
     place_in_world,
     scan_points,
 )
@@ -91,6 +92,24 @@ def test_what_is_no_reading_is_no_point() -> None:
     assert scan_points(scan(math.inf, math.nan, -math.inf, 9.0, 0.01, 1.0), Pose2D(0, 0, 0)) == ((0.0, 1.0),)
     assert scan_points(scan(1.0, increment=math.nan), Pose2D(0, 0, 0)) == ()
     assert scan_points(scan(), Pose2D(0, 0, 0)) == ()
+
+
+@given(speed=st.floats(-1, 1), turn=st.floats(-2, 2), yaw=st.floats(-3, 3))
+def test_the_arc_is_the_way_of_the_next_second(speed: float, turn: float, yaw: float) -> None:
+    points, x, y, heading = arc_points(Velocity(speed, turn), Pose2D(1.0, 2.0, yaw)), 1.0, 2.0, yaw
+    if abs(speed) < 0.02:
+        assert points == ()
+        return
+    for step in range(1, 1001):
+        x += speed * 0.001 * math.cos(heading)
+        y += speed * 0.001 * math.sin(heading)
+        heading += turn * 0.001
+        if step % 100 == 0:
+            assert points[step // 100 - 1] == pytest.approx((x, y), abs=0.01)
+
+
+def test_a_robot_that_turns_in_place_has_no_arc() -> None:
+    assert arc_points(Velocity(0.0, 1.0), Pose2D(0.0, 0.0, 0.0)) == ()
 
 
 def test_a_long_scan_is_drawn_in_part() -> None:

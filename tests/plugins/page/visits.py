@@ -25,12 +25,28 @@ PATIENCE_MS = 90_000
 _STANDS_S = 1.0
 # Small: without a graphics card, each pixel costs.
 WINDOW: ViewportSize = {"width": 1000, "height": 600}
+DESKTOP: ViewportSize = {"width": 1440, "height": 900}
+PHONE: ViewportSize = {"width": 390, "height": 844}
 
 NEEDS_A_BROWSER = [
     pytest.mark.browser,
     pytest.mark.slow,
     pytest.mark.skipif(chromium.find() is None, reason=f"no browser found: none of {', '.join(chromium.NAMES)}"),
 ]
+
+
+def each_when_there_is_time(*values: str) -> list[Any]:
+    """Return these as parameters of a test that others stand for: for make test-all, where it has time for them."""
+    return [pytest.param(value, marks=pytest.mark.exhaustive) for value in values]
+
+
+IN_LANGUAGES_AND_SIZES = [
+    pytest.param("en-US", DESKTOP, id="en-US-desktop"),
+    pytest.param("de-DE", PHONE, id="de-DE-phone"),
+    pytest.param("en-US", PHONE, id="en-US-phone", marks=pytest.mark.exhaustive),
+    pytest.param("de-DE", DESKTOP, id="de-DE-desktop", marks=pytest.mark.exhaustive),
+]
+"""For a test of a whole visit: in both languages, and on both sizes of a screen."""
 
 
 @dataclass

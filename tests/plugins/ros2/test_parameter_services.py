@@ -59,7 +59,7 @@ def parameter(name: str, value: Any) -> Any:
 def test_names_are_those_of_the_command_line() -> None:
     names = Client().call("list_parameters", prefixes=[], depth=0).result
     assert names.names[:3] == ["mode", "rule", "ramp"]
-    assert {"actions.Peace", "collision_monitor.enabled", "use_sim_time"} < set(names.names)
+    assert {"actions.Peace", "collision_monitor.margin", "use_sim_time"} < set(names.names)
     assert names.prefixes == ["actions", "collision_monitor", "joy"]
     assert "landmarks.model" in Client("signs").call("list_parameters", prefixes=[], depth=0).result.names
 

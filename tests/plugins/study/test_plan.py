@@ -21,7 +21,7 @@ def test_the_example_is_a_plan() -> None:
     assert plan.participants[:2] == ("P01", "P02")
     assert load_courses(plan, EXAMPLE)["slalom"].gates
     configs = load_configs(plan, EXAMPLE, {})
-    assert [configs[name].control.rule for name in ("signs", "cruise", "pad")] == ["course", "cruise", "course"]
+    assert [configs[name].control.rule for name in ("signs", "point", "pad")] == ["course", "point", "course"]
     assert configs["joystick"].control.mode == "joystick"
     assert len(plan.participants) % group_size(plan) == 0
 

@@ -1,10 +1,20 @@
+from dataclasses import replace
+
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.plugins.teach.dataset import Dataset
+from handsteer.plugins.teach.dataset import Dataset, LabelSummary
 from handsteer.plugins.teach.evaluation.intervals import Share
 from handsteer.plugins.teach.evaluation.photo_metrics import Confusion
-from handsteer.plugins.teach.report import Lookalike, TrainingReport, false_hands, how_it_was_tried, mistakes, split
+from handsteer.plugins.teach.report import (
+    CustomSignFigures,
+    Lookalike,
+    TrainingReport,
+    false_hands,
+    how_it_was_tried,
+    mistakes,
+    split,
+)
 from tests.plugins.teach.takes import take
 
 
@@ -72,3 +82,11 @@ def test_every_take_is_held_out_once() -> None:
     held_out = [id(each) for fold in folds for each in fold.held_out]
     assert sorted(held_out) == sorted(id(each) for each in data.takes)
     assert len(folds) == 3
+
+
+def test_a_hand_counts_once_however_often_it_was_tried() -> None:
+    either = CustomSignFigures(LabelSummary("Peace", 5, 119, 1, 1), False, 0.9, Share(230, 238))
+    assert (either.hands_tried, replace(either, recall=None).hands_tried) == (119, 0)
+    assert replace(either, sided=True, recall=Share(100, 119)).hands_tried == 119
+    tried = replace(report(counts=((0, 0, 0),) * 3), signs=(either,))
+    assert how_it_was_tried(tried).startswith("Recognition of held-out hands, each as it is and mirrored, one take")

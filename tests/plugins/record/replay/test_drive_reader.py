@@ -34,9 +34,12 @@ from handsteer.nodes.status import RobotStatus
 from handsteer.plugins.record.mcap_reader import McapFile
 from handsteer.plugins.record.mcap_writer import McapWriter
 from handsteer.plugins.record.recorded import Recorded
+from handsteer.plugins.record.replay import report_words as words
 from handsteer.plugins.record.replay.drive_facts import DriveFacts
 from handsteer.plugins.record.replay.drive_reader import read_drive
 from handsteer.plugins.record.replay.stand_log import MOST_PICTURES
+from handsteer.robots.editing import rename
+from handsteer.robots.world import load_world
 from handsteer.transports.encoding import encode
 from handsteer.types import CourseState
 
@@ -299,6 +302,47 @@ def test_laps_and_bumps_of_several_tries(tmp_path: Path) -> None:
     assert facts.laps[1].course.score_s == 5.0 + 2.0 + 10.0
     assert len(facts.bumps) == 3
     assert facts.distance_m == 4.0
+
+
+def reported(path: Path, statuses: Iterable[RobotStatus]) -> DriveFacts:
+    """Return the facts of a recording with a status each second."""
+    return facts_of(
+        written(
+            path,
+            [
+                (float(n), DIAGNOSTICS, write_status(status, "robot", Time(sec=n, nanosec=0)))
+                for n, status in enumerate(statuses)
+            ],
+        )
+    )
+
+
+def test_a_lap_from_before_the_recording_is_none_of_it_or_says_so(tmp_path: Path) -> None:
+    finished = [CourseState(3, 3, time_s=31.5, phase="finished")] * 3
+    assert reported(tmp_path / "over.mcap", [RobotStatus(course=course) for course in finished]).laps == []
+    running = [CourseState(3, 2, time_s=14.0 + n, phase="running") for n in range(3)]
+    facts = reported(tmp_path / "running.mcap", [RobotStatus(course=course) for course in running])
+    assert [(lap.began_s, lap.course.time_s) for lap in facts.laps] == [(-14.0, 16.0)]
+    (laps,) = (total for total in words.totals(facts) if total.name == "laps")
+    assert laps.more.endswith("0:16.0, begun 14.0 s before the recording")
+
+
+def test_the_worlds_are_those_that_it_drove_in(tmp_path: Path) -> None:
+    names = ("slalom", "slalom", "My course", "slalom")
+    facts = reported(tmp_path / "drive.mcap", [RobotStatus(world=name) for name in names])
+    assert facts.totals()["world"] == "slalom, then My course, then slalom"
+
+
+@pytest.mark.slow
+def test_a_world_that_was_loaded_before_the_recording_is_named(tmp_path: Path) -> None:
+    with Graph(Config(), SteppedClock()) as graph:
+        loaded = graph.robot.enter_world(rename(load_world("slalom"), "Mine"))
+        graph.run_stepped(0.5)
+        loaded.result(0)
+        graph.record(tmp_path / "drive.mcap")
+        graph.run_stepped(1.0)
+    facts = facts_of(tmp_path / "drive.mcap")
+    assert (facts.worlds, facts.laps) == (["Mine"], [])
 
 
 def test_a_stop_that_is_set_twice_counts_once(tmp_path: Path) -> None:

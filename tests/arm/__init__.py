@@ -1,0 +1,1 @@
+"""Recognition on an emulated 64-bit ARM processor."""

@@ -1,0 +1,180 @@
+"""``control.assist: steer`` before points, and in histories of random wishes among random points."""
+
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from handsteer.config import CollisionMonitorConfig
+from handsteer.control.assist import TURNS_RADPS, Around, is_within
+from handsteer.control.footprint import Points, gaps, seen_from
+from handsteer.control.obstacles import ObstacleLimiter, limit
+from handsteer.plugins.assist.steer import CLEAR_S, REACH_S, WIDEST_RAD, Steer, steered
+from handsteer.types import ZERO, Velocity
+
+RULE = CollisionMonitorConfig()
+MAX_RADPS = 2.0
+CASES = int(os.environ.get("HANDSTEER_STEPS", "4000")) // 4
+FORWARD = Velocity(0.5, 0.0)
+
+
+def around(points: Points, moving: Velocity, max_radps: float = MAX_RADPS) -> Around:
+    return Around(points, moving, RULE, max_radps)
+
+
+def at(*points: tuple[float, float]) -> Points:
+    return np.array(points, dtype=np.float64).reshape(-1, 2)
+
+
+def steer(wanted: Velocity, points: Points, moving: Velocity | None = None) -> Velocity:
+    return steered(wanted, around(points, wanted if moving is None else moving))[0]
+
+
+def wall_ahead(gap_m: float) -> Points:
+    return at(*((RULE.front + gap_m, y) for y in np.linspace(-3, 3, 301)))
+
+
+@pytest.mark.parametrize("wanted", [FORWARD, Velocity(-0.4, 0.3), Velocity(1.0, -2.0)])
+def test_free_of_obstacles_it_changes_nothing(wanted: Velocity) -> None:
+    assert steered(wanted, around(at(), ZERO)) == (wanted, None)
+    assert steered(wanted, around(at((4.0, 0.0), (-4.0, 0.0)), ZERO)) == (wanted, None)
+
+
+@pytest.mark.parametrize(("y", "side"), [(-0.1, 1), (0.1, -1)])
+@pytest.mark.parametrize("way", [1, -1], ids=["forward", "backward"])
+def test_it_steers_to_the_side_on_which_less_is_in_the_way(y: float, side: int, way: int) -> None:
+    post = at((way * 0.75, y))
+    velocity, avoided = steered(Velocity(way * 0.5, 0.0), around(post, Velocity(way * 0.5, 0.0)))
+    assert velocity.angular_radps * side * way > 0
+    assert velocity.linear_mps * way > 0
+    assert avoided is not None
+    assert (avoided.x, avoided.y) == (way * 0.75, y)
+
+
+def test_it_keeps_the_side_to_which_the_robot_turns_already() -> None:
+    post = at((0.8, 0.0))
+    for turn in (0.3, -0.3):
+        assert steer(FORWARD, post, Velocity(0.5, turn)).angular_radps * turn > 0
+
+
+def test_who_wants_to_stand_stands_and_who_turns_in_place_only_turns() -> None:
+    beside = at((0.2, 0.27), (0.3, 0.0))
+    for wanted in (ZERO, Velocity(0.0, 1.0), Velocity(0.0, -1.0)):
+        assert steered(wanted, around(beside, Velocity(0.4, 0.2))) == (wanted, None)
+
+
+@pytest.mark.parametrize("turn", [0.3, -0.3])
+def test_it_does_not_turn_against_a_turn_that_the_person_makes(turn: float) -> None:
+    """A post on the side to which the person turns: the other side is free."""
+    post = at((0.7, math.copysign(0.15, turn)))
+    velocity = steer(Velocity(0.5, turn), post)
+    assert velocity.angular_radps * turn >= 0
+
+
+def test_what_cannot_be_avoided_is_left_to_the_brake() -> None:
+    for gap_m in (0.05, 0.1):
+        wanted = Velocity(0.6, 0.0)
+        assert steered(wanted, around(wall_ahead(gap_m), wanted)) == (wanted, None)
+        limiter = ObstacleLimiter(RULE)
+        limiter.assist, limiter.max_angular_radps = Steer(), MAX_RADPS
+        limiter.see(wall_ahead(gap_m), 0.0)
+        limiter.feel(wanted, 0.0)
+        assert limiter.limit(wanted, 0.0).linear_mps == 0.0
+
+
+def test_the_limit_of_turns_holds() -> None:
+    post = at((0.75, 0.05))
+    assert abs(steered(FORWARD, around(post, FORWARD, 0.2))[0].angular_radps) <= 0.2
+
+
+@dataclass(frozen=True)
+class Case:
+    wanted: Velocity
+    moving: Velocity
+    points: Points
+
+
+def cases(count: int, seed: int) -> Iterator[Case]:
+    """Yield random wishes and motions among random posts and walls, none of them nearer than 9 cm."""
+    random = np.random.default_rng(seed)
+    for number in range(count):
+        wanted = Velocity(float(random.uniform(-1, 1)), float(random.uniform(-2, 2)))
+        if number % 3 == 0:
+            wanted = Velocity(wanted.linear_mps, 0.0)
+        if number % 17 == 0:
+            wanted = ZERO if number % 2 else Velocity(0.0, wanted.angular_radps)
+        moving = Velocity(
+            wanted.linear_mps + float(random.normal(0, 0.2)), wanted.angular_radps + float(random.normal(0, 0.4))
+        )
+        angles = random.uniform(-math.pi, math.pi, random.integers(1, 8))
+        posts = random.uniform(0.3, 2.0, len(angles))[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        if number % 2:
+            along = np.linspace(-2, 2, 60)
+            turn, off = random.uniform(-math.pi, math.pi), random.uniform(0.3, 1.5)
+            wall = np.stack(
+                [off * math.cos(turn) - along * math.sin(turn), off * math.sin(turn) + along * math.cos(turn)]
+            )
+            posts = np.concatenate([posts, wall.T])
+        free = gaps(posts[:, 0], posts[:, 1], RULE) > 0.09
+        yield Case(wanted, moving, posts[free])
+
+
+def path(moving: Velocity, target: Velocity, seconds: float) -> Points:
+    """Return the poses of a robot that changes its velocity at the guaranteed decelerations, in steps of 5 ms."""
+    v, w, x, y, yaw = moving.linear_mps, moving.angular_radps, 0.0, 0.0, 0.0
+    poses = []
+    for _ in range(round(seconds / 0.005)):
+        v += max(-RULE.deceleration * 0.005, min(target.linear_mps - v, RULE.deceleration * 0.005))
+        w += max(-RULE.angular_deceleration * 0.005, min(target.angular_radps - w, RULE.angular_deceleration * 0.005))
+        x, y, yaw = x + v * 0.005 * math.cos(yaw), y + v * 0.005 * math.sin(yaw), yaw + w * 0.005
+        poses.append((x, y, yaw))
+    return np.array(poses)
+
+
+def test_in_random_cases_the_person_keeps_the_say_and_the_path_keeps_clear() -> None:
+    """``HANDSTEER_STEPS`` says how many: a quarter of it."""
+    steered_cases = 0
+    for number, case in enumerate(cases(CASES, 0)):
+        wanted, moving = case.wanted, case.moving
+        velocity, avoided = steered(wanted, around(case.points, moving))
+        assert is_within(velocity, wanted, MAX_RADPS)
+        assert abs(velocity.linear_mps) <= abs(wanted.linear_mps)
+        assert velocity.linear_mps * wanted.linear_mps >= 0.0
+        assert not wanted.is_zero or velocity.is_zero
+        assert wanted.linear_mps or velocity == wanted
+        assert abs(velocity.angular_radps) <= MAX_RADPS
+        if abs(wanted.angular_radps) >= TURNS_RADPS:
+            assert velocity.angular_radps * wanted.angular_radps >= 0.0
+        off_rad = (velocity.angular_radps - wanted.angular_radps) * CLEAR_S / 2
+        assert abs(off_rad) <= WIDEST_RAD + 1e-9
+        if avoided is None:
+            assert velocity == wanted
+            continue
+        steered_cases += 1
+        assert abs(velocity.angular_radps - moving.angular_radps) <= REACH_S * RULE.angular_deceleration + 1e-9
+        if number % 5 == 0:
+            least_m = gaps(*seen_from(path(moving, velocity, CLEAR_S), case.points), RULE).min()
+            assert least_m > 0.0, case
+    assert steered_cases > CASES / 20
+
+
+def test_in_random_cases_the_brake_has_the_last_word() -> None:
+    """What is commanded in the end is never faster than without the assist's say, and never against the person."""
+    for case in cases(CASES // 3, 1):
+        limiter = ObstacleLimiter(RULE)
+        limiter.assist, limiter.max_angular_radps = Steer(), MAX_RADPS
+        limiter.see(case.points, 0.0)
+        limiter.feel(case.moving, 0.0)
+        allowed = limiter.limit(case.wanted, 0.0)
+        assert is_within(allowed, case.wanted, MAX_RADPS)
+        if limiter.avoided is not None:
+            made, _ = steered(case.wanted, around(case.points, case.moving))
+            assert allowed == limit(made, case.points, RULE, case.moving)[0]
+        else:
+            plain = ObstacleLimiter(RULE)
+            plain.see(case.points, 0.0)
+            plain.feel(case.moving, 0.0)
+            assert allowed == plain.limit(case.wanted, 0.0)

@@ -1,0 +1,59 @@
+"""The control's assist on a lap."""
+
+import pytest
+
+from handsteer.config import Config
+from handsteer.errors import BenchError
+from handsteer.plugins.bench.assisting import Assistance
+from handsteer.plugins.bench.cells import Cell
+from handsteer.plugins.bench.laps import Conditions
+from handsteer.plugins.bench.verb import Varied, _conditions
+from handsteer.plugins.sim.simulated import SimulatedRobot
+from handsteer.robots.world import World
+from handsteer.types import Velocity
+
+WALL = {"name": "wall", "shape": "box", "size": [0.2, 1.2, 0.5], "position": [0.9, -0.4]}
+WANTED = Velocity(0.6, 0.0)
+
+
+def admitted(kind: str) -> tuple[Velocity, Velocity | None]:
+    robot = SimulatedRobot(Config().robot, World.model_validate({"obstacles": [WALL]}))
+    assistance = Assistance(kind, Config(), robot)
+    state = robot.step(0.01)
+    assistance.note(state)
+    return assistance.admit(WANTED, state.time_s)
+
+
+def test_off_changes_nothing() -> None:
+    assert admitted("off") == (WANTED, None)
+
+
+def test_the_brake_slows_by_the_robot_s_scanner_and_the_control_goes_on_from_there() -> None:
+    allowed, goes_on = admitted("brake")
+    assert 0.0 < allowed.linear_mps < 0.6
+    assert goes_on == allowed
+
+
+def test_steer_turns_to_the_free_side_and_the_control_does_not() -> None:
+    allowed, goes_on = admitted("steer")
+    assert allowed.angular_radps > 0.1
+    assert goes_on == Velocity(allowed.linear_mps, 0.0)
+
+
+def test_before_the_first_scan_nothing_moves() -> None:
+    robot = SimulatedRobot(Config().robot, World())
+    assert Assistance("brake", Config(), robot).admit(WANTED, 0.0)[0].is_zero
+
+
+def test_each_assist_is_a_condition_of_its_own_and_a_row_of_the_table() -> None:
+    assert [each.assist for each in Varied().conditions("brake")] == ["brake"]
+    varied = Varied(sweep=["latency=0,250"], assist=["off", "steer"]).conditions("off")
+    assert [(each.latency_s, each.assist) for each in varied] == [
+        (0.0, "off"),
+        (0.0, "steer"),
+        (0.25, "off"),
+        (0.25, "steer"),
+    ]
+    assert [_conditions(Cell("maze", "pad", each)) for each in varied] == ["-", "steer", "+250 ms", "+250 ms, steer"]
+    with pytest.raises(BenchError, match="assist: 'push' should be off, brake, steer"):
+        Conditions(assist="push")
