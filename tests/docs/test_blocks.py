@@ -54,7 +54,7 @@ def test_a_file_is_read_by_what_it_is_for(file: Part, tmp_path: Path) -> None:
         assert list(load_courses(plan, path)) == ["slalom", "my-course.yaml"]
     elif file.page.name == "worlds.md":
         world = load_world(path)
-        assert (len(world.obstacles), len(world.gates)) == (3, 2)
+        assert (len(world.obstacles), len(world.gates)) == (4, 2)
     elif "lifecycle_manager" in file.text:
         names = yaml.safe_load(file.text)["lifecycle_manager_hand_signs"]["ros__parameters"]["node_names"]
         assert names == [

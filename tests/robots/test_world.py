@@ -18,7 +18,8 @@ def thing(fields: str) -> str:
 
 
 def test_shipped_worlds() -> None:
-    courses = ["doors", "figure-eight", "maze", "parking", "roundabout", "slalom", "stop-line", "warehouse"]
+    courses = ["corridor", "doors", "figure-eight", "maze", "narrow-doors", "parking", "roundabout", "slalom"]
+    courses += ["stop-line", "warehouse"]
     assert shipped_worlds() == sorted(["empty", "obstacles", *courses])
     assert all(load_world(name).gates for name in courses)
     assert load_world("empty").obstacles == ()
@@ -73,6 +74,9 @@ def test_an_unknown_name_lists_the_known_ones() -> None:
         (thing(BOX + ", mass: 0"), "'a' mass: 0 should be greater"),
         (thing(BOX + ", movable: perhaps"), "'a' movable: 'perhaps'"),
         (thing(BOX + ", colour: '#12345'"), "'a' colour: '#12345'"),
+        (thing(BOX + ", route: [[1, 2], [3]]"), "'a' route.1"),
+        (thing(BOX + ", speed: 0"), "'a' speed: 0 should be greater"),
+        (thing(BOX + ", route: [[1, 2]], movable: true"), "'a': a thing with a route cannot be movable as well"),
         (thing(BOX).replace("[3, 0]", "[3, 1e9]"), "'a' position.1"),
         (thing(BOX).replace("[3, 0]", "here"), "'a' position"),
         (thing(BOX) + "  - {" + BOX + "}", "two are called 'a'"),
@@ -130,7 +134,9 @@ common = {
     "colour": colours,
     "movable": st.booleans(),
     "mass": st.floats(0.01, 1000),
+    "speed": st.floats(0.01, 3),
 }
+routes = st.lists(places, max_size=3)
 things = st.one_of(
     st.fixed_dictionaries({"shape": st.just("box"), "size": st.tuples(metres, metres, metres), **common}),
     st.fixed_dictionaries({"shape": st.just("cylinder"), "radius": metres, "height": metres, **common}),
@@ -147,7 +153,13 @@ worlds = st.builds(
     st.fixed_dictionaries(
         {
             "floor": st.fixed_dictionaries({"size": st.tuples(metres, metres), "colour": colours}),
-            "obstacles": st.lists(things, max_size=5, unique_by=lambda thing: thing["name"]),
+            "obstacles": st.lists(
+                st.builds(
+                    lambda thing, route: thing if thing["movable"] else {**thing, "route": route}, things, routes
+                ),
+                max_size=5,
+                unique_by=lambda thing: thing["name"],
+            ),
             "gates": st.lists(gates, max_size=4, unique_by=lambda gate: gate["name"]),
             "path": st.lists(st.tuples(numbers, numbers), max_size=4),
             "stop": st.none() | st.fixed_dictionaries({"position": st.tuples(numbers, numbers)}),

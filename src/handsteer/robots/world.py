@@ -7,6 +7,7 @@
       - {name: wall, shape: box, size: [0.2, 4, 0.6], position: [4, 0], yaw: 0.3}
       - {name: barrel, shape: cylinder, radius: 0.2, height: 0.5, position: [2, 1], movable: true, mass: 2}
       - {name: ball, shape: sphere, radius: 0.15, position: [2, -1], movable: true}
+      - {name: Ada, shape: cylinder, radius: 0.25, height: 1.7, position: [3, 1], route: [[3, -1]], speed: 0.8}
     gates:
       - {name: start, left: [1, 0.5], right: [1, -0.5]}
 
@@ -52,6 +53,16 @@ class _Thing(Section):
     colour: Colour = Field("#8a94a6", description="As on web pages: #rrggbb")
     movable: bool = Field(False, description="Whether the robot can push it")
     mass: float = Field(1.0, ge=0.01, le=1000, description="Of a movable thing [kg]")
+    route: tuple[tuple[Coordinate, Coordinate], ...] = Field(
+        (), max_length=20, description="x and y of the points to which it goes from its place, and back again [m]"
+    )
+    speed: float = Field(0.8, ge=0.01, le=3, description="Of a thing with a route [m/s]")
+
+    @model_validator(mode="after")
+    def _goes_or_is_pushed(self) -> "_Thing":
+        if self.route and self.movable:
+            raise ValueError("a thing with a route cannot be movable as well")
+        return self
 
     @property
     def rgba(self) -> tuple[float, float, float, float]:

@@ -175,6 +175,62 @@ def test_obstacles_are_told_where_they_are() -> None:
     assert (can.shape, can.size, can.position) == ("cylinder", (0.2, 0.2, 0.6), (0.0, 2.0, 0.3))
 
 
+def walker(**fields: object) -> dict[str, object]:
+    found = {"name": "Ada", "shape": "cylinder", "radius": 0.25, "height": 1.7, "position": [3, 1], "speed": 0.5}
+    return {**found, "route": [[3, -1], [4, -1]], **fields}
+
+
+def place_of(robot: SimulatedRobot) -> tuple[float, float]:
+    (ada,) = (each for each in robot.obstacles() if each.name == "Ada")
+    return ada.position[0], ada.position[1]
+
+
+def test_a_thing_with_a_route_goes_along_it_and_back() -> None:
+    robot = make(walker())
+    seen = []
+    for _ in range(13):
+        seen.append(place_of(robot))
+        robot.step(1.0)
+    there = [(3, 1), (3, 0.5), (3, 0), (3, -0.5), (3, -1), (3.5, -1), (4, -1)]
+    assert np.allclose(seen, [*there, *reversed(there[:-1])], atol=0.02)
+
+
+def test_who_walks_is_seen_by_the_scanner_where_they_are() -> None:
+    robot = make(walker(route=[[1, 1]]))
+    before = robot.scan().ranges
+    robot.step(4.0)
+    after = robot.scan().ranges
+    assert np.isfinite(before).sum() > 3
+    assert float(np.min(after)) == pytest.approx(math.hypot(1, 1) - 0.25, abs=0.02)
+
+
+def test_who_meets_the_robot_stops_before_it_and_turns_round() -> None:
+    robot = make(walker(position=[2, 0], route=[[-2, 0]]))
+    met = [(robot.step(0.1), place_of(robot)[0]) for _ in range(60)]
+    assert min(x for _, x in met) == pytest.approx(0.9, abs=0.02)
+    assert met[-1][1] > 1.3
+    assert met[-1][0].collisions == 0
+
+
+def test_a_robot_that_drives_into_somebody_touches_them() -> None:
+    robot = make(walker(position=[1.5, 0.05], route=[[1.5, 0.06]]))
+    state = end_of(drive(robot, 0.5, 0.0, 4.0))
+    assert state.collisions
+    assert state.contacts == ("Ada",)
+    assert state.truth.x < 1.1
+
+
+def test_who_walks_goes_on_from_there_when_the_world_changes_and_begins_again_with_the_lap() -> None:
+    robot = make(walker(route=[[3, -1]]))
+    robot.step(1.0)
+    robot.change(World.model_validate({"obstacles": [wall(position=[-3, 0]), walker(route=[[3, -1]])]}))
+    assert place_of(robot) == pytest.approx((3.0, 0.5), abs=0.02)
+    robot.step(1.0)
+    assert place_of(robot) == pytest.approx((3.0, 0.0), abs=0.02)
+    robot.reset()
+    assert place_of(robot) == pytest.approx((3.0, 1.0))
+
+
 def test_reset_puts_everything_back_but_time_goes_on() -> None:
     robot = make({"name": "ball", "shape": "sphere", "radius": 0.15, "position": [0.8, 0], "movable": True})
     at_start = robot.obstacles()

@@ -196,10 +196,13 @@ def _add_thing(spec: mujoco.MjSpec, name: str, thing: Thing) -> None:
         "conaffinity": _ALL,
         "group": THINGS_GROUP,
     }
-    if not thing.movable:
+    if not thing.movable and not thing.route:
         spec.worldbody.add_geom(name=name, **shape, **pose)
         return
-    body = spec.worldbody.add_body(name=name, **pose)
+    body = spec.worldbody.add_body(name=name, mocap=bool(thing.route), **pose)
+    if thing.route:
+        body.add_geom(name=name, **shape)
+        return
     body.add_freejoint(name=name)
     geom = body.add_geom(name=name, mass=thing.mass, **shape)
     geom.friction[0] = 0.5

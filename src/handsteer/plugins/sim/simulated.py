@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
 from handsteer.plugins.sim.physics import ROBOT_JOINT, TIMESTEP_S, WHEEL_JOINTS, Lidar, compile_model, thing_name
+from handsteer.plugins.sim.walks import Walk, walks_in
 from handsteer.robots import Obstacle, RangeScan, RobotState, diff_drive
 from handsteer.robots.description import robot_description
 from handsteer.robots.diff_drive import DriveState
@@ -73,6 +74,7 @@ class SimulatedRobot:
         self._asked_s = 0.0
         self._steps = 0
         self._command: Velocity | None = None
+        self._walks: dict[int, Walk] = {}
         world = load_world(config.world) if world is None else world
         self._take(world, compile_model(self.description, world))
         self.reset()
@@ -126,11 +128,16 @@ class SimulatedRobot:
         new = {thing.name for index, thing in enumerate(world.obstacles) if index not in same}
         if touched := new.intersection(_touched_at_start(model, world)):
             raise WorldError(_at_start(min(touched)))
-        data = self._carried_over(model, {now: then for now, then in same.items() if world.obstacles[now].movable})
+        walks: dict[int, Walk] = walks_in(world) | {
+            now: self._walks[then] for now, then in same.items() if then in self._walks
+        }
+        movable = {now: then for now, then in same.items() if world.obstacles[now].movable}
+        data = self._carried_over(model, movable, walks)
         if touched := new.intersection(Contacts(model, world).touched(data)):
             raise WorldError(f"{min(touched)!r} would overlap the robot: keep 0.35 m around it free")
         self._take(world, model)
         self.data = data
+        self._walks = walks
         self._command = None
         self._stop()
 
@@ -143,6 +150,7 @@ class SimulatedRobot:
         self._odometry = Pose2D(0.0, 0.0, 0.0)
         self._collisions = 0
         self._touched_until: dict[str, int] = {}
+        self._walks = walks_in(self.world)
 
     def reset_odometry(self) -> None:
         """Set the odometry to 0 without moving the robot."""
@@ -164,18 +172,21 @@ class SimulatedRobot:
         self._lidar = Lidar(model, self.description)
         self._pose_at = int(model.joint(ROBOT_JOINT).qposadr[0])
 
-    def _carried_over(self, model: mujoco.MjModel, same: dict[int, int]) -> mujoco.MjData:
+    def _carried_over(self, model: mujoco.MjModel, same: dict[int, int], walks: dict[int, Walk]) -> mujoco.MjData:
         """Return a state of ``model`` at rest, with the robot at its current place.
 
         Args:
             model: The new one.
             same: Movable things that also keep their places: index in the new world to index in the current one.
+            walks: Where the things with a route are, by their index in the new world.
         """
         data = mujoco.MjData(model)
         joints = {name: name for name in (ROBOT_JOINT, *WHEEL_JOINTS)}
         joints |= {thing_name(now): thing_name(then) for now, then in same.items()}
         for now, then in joints.items():
             data.joint(now).qpos[:] = self.data.joint(then).qpos
+        for index, walk in walks.items():
+            data.mocap_pos[_mocap(model, index), :2] = walk.place()
         mujoco.mj_forward(model, data)
         return data
 
@@ -183,6 +194,7 @@ class SimulatedRobot:
         self._drive = diff_drive.step(self._drive, self._command, TIMESTEP_S, self._config)
         self._command = None
         self.data.ctrl[: len(WHEEL_JOINTS)] = 2 * diff_drive.wheel_speeds(self._drive.velocity, self._config)
+        self._walk()
         before = self.data.qpos.copy()
         mujoco.mj_step(self.model, self.data)
         if not np.abs(self.data.qvel).max() < _WILD_SPEED:  # also true for NaN
@@ -192,6 +204,12 @@ class SimulatedRobot:
         turned = self.data.qpos[self._wheel_angles] - before[self._wheel_angles]
         self._odometry = diff_drive.integrate(self._odometry, *_sides(turned), self._config)
         self._count_collisions()
+
+    def _walk(self) -> None:
+        """Move the things with a route by one step."""
+        robot = self.data.qpos[self._pose_at : self._pose_at + 2]
+        for index, walk in self._walks.items():
+            self.data.mocap_pos[_mocap(self.model, index), :2] = walk.step(TIMESTEP_S, robot)
 
     def _stop(self) -> None:
         self._drive = DriveState()
@@ -229,10 +247,18 @@ class SimulatedRobot:
         if self.world.obstacles[index].movable:
             start = int(self.model.joint(thing_name(index)).qposadr[0])
             x, y, z, qw, qx, qy, qz = self.data.qpos[start : start + 7].tolist()
+        elif index in self._walks:
+            body = self.data.body(thing_name(index))
+            (x, y, z), (qw, qx, qy, qz) = body.xpos.tolist(), body.xquat.tolist()
         else:
             geom = self.model.geom(thing_name(index))
             (x, y, z), (qw, qx, qy, qz) = geom.pos.tolist(), geom.quat.tolist()
         return (x, y, z), (qx, qy, qz, qw)
+
+
+def _mocap(model: mujoco.MjModel, index: int) -> int:
+    """Return the number of the thing with a route among the bodies that MuJoCo does not move."""
+    return int(model.body(thing_name(index)).mocapid[0])
 
 
 def _sides(wheels: NDArray[np.float64]) -> tuple[float, float]:
