@@ -36,8 +36,8 @@ def around(places: list[tuple[float, float]]) -> Points:
 surroundings = st.lists(st.tuples(st.floats(0.37, 6.0), st.floats(-math.pi, math.pi)), max_size=30).map(around)
 
 
-def speed(wanted: Velocity, points: Points, **more: Velocity) -> float:
-    return limit(wanted, points, RULE, **more)[0].linear_mps
+def speed(wanted: Velocity, points: Points, moving: Velocity = ZERO) -> float:
+    return limit(wanted, points, RULE, moving)[0].linear_mps
 
 
 def braking_way_m(linear_mps: float) -> float:

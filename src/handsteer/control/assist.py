@@ -23,12 +23,14 @@ class Around:
         moving: The robot's velocity.
         rule: Size of the robot, and its decelerations.
         max_angular_radps: The highest turn rate, above 0.
+        drift: Velocities of the points, (N, 2) in m/s; None if none moves.
     """
 
     points: Points
     moving: Velocity
     rule: CollisionMonitorConfig
     max_angular_radps: float
+    drift: Points | None = None
 
 
 log = logging.getLogger(__name__)

@@ -119,6 +119,12 @@ def seen_from(poses: Array, points: Array) -> tuple[Array, Array]:
     return seen[: len(poses)], seen[len(poses) :]
 
 
+def drifted(seen: tuple[Array, Array], poses: Array, times_s: Array, drift: Points) -> tuple[Array, Array]:
+    """Return what :func:`seen_from` returned, of points that move at ``drift`` (N, 2) m/s, at ``times_s`` (K,)."""
+    x, y = seen_from(np.stack([np.zeros(len(poses)), np.zeros(len(poses)), poses[:, 2]], axis=1), drift)
+    return seen[0] + times_s[:, None] * x, seen[1] + times_s[:, None] * y
+
+
 def after(velocity: Velocity, seconds: float, points: Array) -> Array:
     """Return ``points``, (N, 2), relative to a robot that has moved at constant ``velocity`` for ``seconds``."""
     if velocity.is_zero or not seconds:

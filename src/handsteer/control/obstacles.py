@@ -18,6 +18,7 @@ from handsteer.control.footprint import (
     Points,
     after,
     braking,
+    drifted,
     fastest_mps,
     gaps,
     least_gaps,
@@ -25,6 +26,7 @@ from handsteer.control.footprint import (
     reach_m,
     seen_from,
 )
+from handsteer.control.moving import MotionOfPoints
 from handsteer.doors import Assist
 from handsteer.types import ZERO, Velocity, changed_towards
 
@@ -82,23 +84,26 @@ def limit(
     points: Points,
     rule: CollisionMonitorConfig,
     moving: Velocity = ZERO,
+    drift: Points | None = None,
 ) -> tuple[Velocity, Hit | None]:
     """Return the velocity to command instead of ``wanted``, and the obstacle that limits it, or None.
 
     The result is never faster than ``wanted`` and never changes direction. A slowed robot may still turn as fast as it
     could in place, so its path becomes tighter. While the robot changes its velocity, it does not yet follow the path
     of the command: obstacles on the path until then, and on the braking path from there, count too. If a collision
-    cannot be avoided, the velocity with the latest one is returned.
+    cannot be avoided, the velocity with the latest one is returned; zero, if something comes.
 
     Args:
         wanted: Velocity requested by signs or steering; finite.
         points: Current obstacles.
         rule: Footprint, margin and decelerations.
         moving: Current velocity of the robot.
+        drift: Velocities of the points, (N, 2) in m/s; None if none moves. Of what moves, the robot keeps clear until
+            it stands.
     """
     if wanted.is_zero or not len(points):
         return wanted, None
-    points = _within_reach(wanted, points, rule, moving)
+    points, drift = _within_reach(wanted, points, rule, moving, drift)
     if not len(points):
         return wanted, None
     share, hit = turn, _ = _share(wanted, points, rule)
@@ -109,23 +114,30 @@ def limit(
         slower = _scaled(wanted, share * linear, turn * angular)
         if hit and _share(slower, points, rule)[1]:
             continue
-        met = _met_while_braking(moving, slower, points, rule)
+        met = _met_while_braking(moving, slower, points, rule, drift)
         if met is None:
             return slower, None if slower == wanted else hit
         hit = hit or met
-        if met.time_s > latest_s:
+        # Whatever it does, it is met by what comes: then it had better stand.
+        if met.time_s > latest_s and drift is None:
             best, latest_s = slower, met.time_s
     return best, None if best == wanted else hit
 
 
-def _within_reach(wanted: Velocity, points: Points, rule: CollisionMonitorConfig, moving: Velocity) -> Points:
-    """Return those of ``points`` that the robot could reach, even if it is slowed."""
+def _within_reach(
+    wanted: Velocity, points: Points, rule: CollisionMonitorConfig, moving: Velocity, drift: Points | None
+) -> tuple[Points, Points | None]:
+    """Return those of ``points``, and of ``drift``, that the robot could reach, even if it is slowed."""
     highest = _highest(moving, wanted)
     way_m = highest.linear_mps * (rule.reaction_time + _braking_s(highest, rule))
     pad_m = _PAD_M + _PAD_S * fastest_mps(highest, rule) + _NOISE_M
     far_m = way_m + rule.margin + _CREEP_M + reach_m(rule) + pad_m
     x, y = points[:, 0], points[:, 1]
-    return points[x * x + y * y <= far_m**2]
+    if drift is None or not drift.any():
+        return points[x * x + y * y <= far_m**2], None
+    comes_m = np.linalg.norm(drift, axis=1) * (rule.reaction_time + _braking_s(highest, rule))
+    near = x * x + y * y <= (far_m + comes_m) ** 2
+    return points[near], drift[near] if drift[near].any() else None
 
 
 def _highest(one: Velocity, other: Velocity) -> Velocity:
@@ -181,7 +193,9 @@ def first_hit(velocity: Velocity, points: Points, rule: CollisionMonitorConfig, 
     return hit if hit and hit.time_s <= horizon_s else None
 
 
-def _met_while_braking(moving: Velocity, target: Velocity, points: Points, rule: CollisionMonitorConfig) -> Hit | None:
+def _met_while_braking(
+    moving: Velocity, target: Velocity, points: Points, rule: CollisionMonitorConfig, drift: Points | None
+) -> Hit | None:
     """Return the first obstacle hit if ``target`` is commanded now and zero one reaction time later, or None."""
     highest = _highest(moving, target)
     fastest = fastest_mps(highest, rule)
@@ -190,7 +204,8 @@ def _met_while_braking(moving: Velocity, target: Velocity, points: Points, rule:
     # A robot that reverses its direction stops on the way, and has to stop again.
     times_s = steps_s(fastest, rule.reaction_time + _braking_s(highest, rule))
     poses = braking(moving, target, rule, rule.reaction_time, times_s)
-    return met(poses, times_s, points, rule, pad_m=_PAD_M + _PAD_S * fastest, fastest_mps=fastest)
+    pad_m = _PAD_M + _PAD_S * fastest
+    return met(poses, times_s, points, rule, pad_m=pad_m, fastest_mps=fastest, drift=drift)
 
 
 def steps_s(fastest_mps: float, seconds: float) -> Points:
@@ -205,7 +220,14 @@ def steps_s(fastest_mps: float, seconds: float) -> Points:
 
 
 def met(
-    poses: Points, times_s: Points, points: Points, rule: CollisionMonitorConfig, *, pad_m: float, fastest_mps: float
+    poses: Points,
+    times_s: Points,
+    points: Points,
+    rule: CollisionMonitorConfig,
+    *,
+    pad_m: float,
+    fastest_mps: float,
+    drift: Points | None = None,
 ) -> Hit | None:
     """Return the first obstacle that the footprint hits along ``poses`` (K, 3) at ``times_s`` (K,), or None.
 
@@ -216,13 +238,22 @@ def met(
         rule: Size of the footprint.
         pad_m: How near is a hit; something nearer already is one only if it comes nearer.
         fastest_mps: Speed of the fastest corner.
+        drift: Velocities of the points, (N, 2) in m/s; None if none moves.
     """
     # Most points stay far away, which a few poses are enough to show.
     beyond_m = pad_m + _NOISE_M + _ROUGHLY * fastest_mps * times_s[1]
-    near = points[least_gaps(*seen_from(poses[1::3], points), rule).min(axis=0) <= beyond_m]
+    seen = seen_from(poses[1::3], points)
+    if drift is not None:
+        seen = drifted(seen, poses[1::3], times_s[1::3], drift)
+        beyond_m += _ROUGHLY * float(np.linalg.norm(drift, axis=1).max()) * float(times_s[1])
+    is_near = least_gaps(*seen, rule).min(axis=0) <= beyond_m
+    near = points[is_near]
     if not len(near):
         return None
-    gap = gaps(*seen_from(poses, near), rule)
+    seen = seen_from(poses, near)
+    if drift is not None:
+        seen = drifted(seen, poses, times_s, drift[is_near])
+    gap = gaps(*seen, rule)
     gap_m = float(gap[0].min())
     # If something is inside the pad already, the robot may still pass obstacles that come no nearer. A corner that
     # swings towards a wall comes nearer by less than a scan's noise, but does so in every step.
@@ -268,6 +299,8 @@ class ObstacleLimiter:
     def __init__(self, rule: CollisionMonitorConfig) -> None:
         self.rule = rule
         self._points: Points | None = None
+        self._drift: Points | None = None
+        self._motion = MotionOfPoints()
         self._measured_s = -math.inf
         self._moving = self._commanded = ZERO
         self._moving_s = self._commanded_s = -math.inf
@@ -279,10 +312,12 @@ class ObstacleLimiter:
     def see(self, points: Points, measured_s: float) -> None:
         """Store a scan measured at ``measured_s``, in seconds of the caller's clock."""
         self._points, self._measured_s = points, measured_s
+        self._drift = self._motion.see(points, measured_s)
 
     def forget(self) -> None:
         """Forget the scan: nothing is known until the next one."""
         self._points = None
+        self._motion.forget()
 
     def feel(self, moving: Velocity, measured_s: float) -> None:
         """Store the robot's velocity from odometry, measured at ``measured_s``; finite.
@@ -290,6 +325,8 @@ class ObstacleLimiter:
         Without odometry, the robot is assumed to change its velocity at its guaranteed deceleration; most robots
         accelerate faster.
         """
+        if self._moving_s < measured_s < self._moving_s + 1.0:
+            self._motion.drive(self._moving, measured_s - self._moving_s)
         self._moving, self._moving_s = moving, measured_s
 
     def silence_s(self, now_s: float) -> float:
@@ -306,16 +343,24 @@ class ObstacleLimiter:
         With ``assist`` it is a limit of what that makes of ``wanted``. The points are moved by the robot's estimated
         motion since the scan.
         """
-        self._moving, self._moving_s = self._followed(now_s), now_s
+        self.feel(self._followed(now_s), now_s)
         self.hit, self.avoided, velocity = None, None, ZERO
         if self._points is not None and not self.is_blind(now_s):
-            points = after(self._moving, self.silence_s(now_s), self._points)
+            points, drift = self._points_at(now_s, self._points)
             if self.assist is not None:
-                around = Around(points, self._moving, self.rule, self.max_angular_radps)
+                around = Around(points, self._moving, self.rule, self.max_angular_radps, drift)
                 wanted, self.avoided = assisted(self.assist, wanted, around)
-            velocity, self.hit = limit(wanted, points, self.rule, self._moving)
+            velocity, self.hit = limit(wanted, points, self.rule, self._moving, drift)
         self._commanded, self._commanded_s = velocity, now_s
         return velocity
+
+    def _points_at(self, now_s: float, points: Points) -> tuple[Points, Points | None]:
+        """Return where the ``points`` of the newest scan are at ``now_s``, and their velocities."""
+        silence_s, drift = self.silence_s(now_s), self._drift
+        if drift is None or not drift.any():
+            return after(self._moving, silence_s, points), None
+        turned = Velocity(0.0, self._moving.angular_radps)
+        return after(self._moving, silence_s, points + silence_s * drift), after(turned, silence_s, drift)
 
     def _followed(self, now_s: float) -> Velocity:
         """Return the velocity at ``now_s`` of a robot that follows the last command at the configured decelerations."""

@@ -10,7 +10,7 @@ import pytest
 
 from handsteer.config import CollisionMonitorConfig
 from handsteer.control.assist import TURNS_RADPS, Around, is_within
-from handsteer.control.footprint import Points, gaps, seen_from
+from handsteer.control.footprint import Points, drifted, gaps, seen_from
 from handsteer.control.obstacles import ObstacleLimiter, limit
 from handsteer.plugins.assist.steer import CLEAR_S, REACH_S, WIDEST_RAD, Steer, steered
 from handsteer.types import ZERO, Velocity
@@ -21,8 +21,8 @@ CASES = int(os.environ.get("HANDSTEER_STEPS", "4000")) // 4
 FORWARD = Velocity(0.5, 0.0)
 
 
-def around(points: Points, moving: Velocity, max_radps: float = MAX_RADPS) -> Around:
-    return Around(points, moving, RULE, max_radps)
+def around(points: Points, moving: Velocity, max_radps: float = MAX_RADPS, *, drift: Points | None = None) -> Around:
+    return Around(points, moving, RULE, max_radps, drift)
 
 
 def at(*points: tuple[float, float]) -> Points:
@@ -60,6 +60,16 @@ def test_it_keeps_the_side_to_which_the_robot_turns_already() -> None:
         assert steer(FORWARD, post, Velocity(0.5, turn)).angular_radps * turn > 0
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_it_passes_behind_who_crosses(side: int) -> None:
+    """Who stands 1 m ahead and walks to the left at 0.2 m/s is passed on the right, and the other way round."""
+    person = at(*((1.0, y) for y in np.linspace(-0.2, 0.2, 9)))
+    walks = np.tile([0.0, 0.2 * side], (len(person), 1))
+    velocity, avoided = steered(FORWARD, around(person, FORWARD, drift=walks))
+    assert avoided is not None
+    assert velocity.angular_radps * side < 0
+
+
 def test_who_wants_to_stand_stands_and_who_turns_in_place_only_turns() -> None:
     beside = at((0.2, 0.27), (0.3, 0.0))
     for wanted in (ZERO, Velocity(0.0, 1.0), Velocity(0.0, -1.0)):
@@ -95,10 +105,11 @@ class Case:
     wanted: Velocity
     moving: Velocity
     points: Points
+    drift: Points | None
 
 
 def cases(count: int, seed: int) -> Iterator[Case]:
-    """Yield random wishes and motions among random posts and walls, none of them nearer than 9 cm."""
+    """Yield random wishes and motions among random posts and walls, none nearer than 9 cm; in a quarter posts walk."""
     random = np.random.default_rng(seed)
     for number in range(count):
         wanted = Velocity(float(random.uniform(-1, 1)), float(random.uniform(-2, 2)))
@@ -119,7 +130,12 @@ def cases(count: int, seed: int) -> Iterator[Case]:
             )
             posts = np.concatenate([posts, wall.T])
         free = gaps(posts[:, 0], posts[:, 1], RULE) > 0.09
-        yield Case(wanted, moving, posts[free])
+        drift = None
+        if number % 4 == 1:
+            drift = np.zeros_like(posts)
+            drift[: len(angles)] = random.uniform(-1, 1, (len(angles), 2))
+            drift = drift[free]
+        yield Case(wanted, moving, posts[free], drift)
 
 
 def path(moving: Velocity, target: Velocity, seconds: float) -> Points:
@@ -139,7 +155,7 @@ def test_in_random_cases_the_person_keeps_the_say_and_the_path_keeps_clear() -> 
     steered_cases = 0
     for number, case in enumerate(cases(CASES, 0)):
         wanted, moving = case.wanted, case.moving
-        velocity, avoided = steered(wanted, around(case.points, moving))
+        velocity, avoided = steered(wanted, around(case.points, moving, drift=case.drift))
         assert is_within(velocity, wanted, MAX_RADPS)
         assert abs(velocity.linear_mps) <= abs(wanted.linear_mps)
         assert velocity.linear_mps * wanted.linear_mps >= 0.0
@@ -156,8 +172,11 @@ def test_in_random_cases_the_person_keeps_the_say_and_the_path_keeps_clear() -> 
         steered_cases += 1
         assert abs(velocity.angular_radps - moving.angular_radps) <= REACH_S * RULE.angular_deceleration + 1e-9
         if number % 5 == 0:
-            least_m = gaps(*seen_from(path(moving, velocity, CLEAR_S), case.points), RULE).min()
-            assert least_m > 0.0, case
+            poses = path(moving, velocity, CLEAR_S)
+            seen = seen_from(poses, case.points)
+            if case.drift is not None:
+                seen = drifted(seen, poses, np.linspace(0.005, 0.005 * len(poses), len(poses)), case.drift)
+            assert gaps(*seen, RULE).min() > 0.0, case
     assert steered_cases > CASES / 20
 
 

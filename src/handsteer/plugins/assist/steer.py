@@ -97,7 +97,11 @@ def _near(wanted: Velocity, way_m: float, around: Around) -> Around:
     reach, points = reach_m(around.rule), around.points
     far_m = max(way_m, fastest.linear_mps * LOOK_S) + reach + PAD_M + _PAD_S * fastest_mps(fastest, around.rule)
     x, y = points[:, 0] * math.copysign(1.0, wanted.linear_mps), points[:, 1]
-    return replace(around, points=points[(x * x + y * y <= far_m**2) & (x >= -reach - PAD_M)])
+    if around.drift is None:
+        return replace(around, points=points[(x * x + y * y <= far_m**2) & (x >= -reach - PAD_M)])
+    comes_m = np.linalg.norm(around.drift, axis=1) * _LONGEST_S
+    near = (x * x + y * y <= (far_m + comes_m) ** 2) & (x >= -reach - PAD_M - comes_m)
+    return replace(around, points=points[near], drift=around.drift[near])
 
 
 def _hit(target: Velocity, way_m: float, around: Around) -> Hit | None:
@@ -112,7 +116,8 @@ def _hit(target: Velocity, way_m: float, around: Around) -> Hit | None:
     clear_s = max(CLEAR_S, min(way_m / abs(target.linear_mps), _LONGEST_S))
     times_s = steps_s(fastest, clear_s)
     poses = braking(moving, target, rule, clear_s, times_s)
-    return met(poses, times_s, around.points, rule, pad_m=PAD_M + _PAD_S * fastest, fastest_mps=fastest)
+    pad_m = PAD_M + _PAD_S * fastest
+    return met(poses, times_s, around.points, rule, pad_m=pad_m, fastest_mps=fastest, drift=around.drift)
 
 
 def _candidates(wanted: Velocity, around: Around) -> Iterator[Velocity]:

@@ -1,0 +1,109 @@
+"""Which obstacles of a scan move, and how: compares a scan with an earlier one of the same scanner."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from handsteer.control.footprint import Array, Points, after
+from handsteer.types import Velocity
+
+BETWEEN_S = 0.25
+"""Scans are compared with one that is so much older, in seconds, or a little more: in that time people go 0.3 m."""
+
+_MOST_S = 0.6
+_APART_M, _WIDEST_M, _FEWEST = 0.2, 0.9, 3
+_SLOWEST_MPS, _FASTEST_MPS = 0.2, 2.0
+_ROUNDS = 4
+# What is seen where nothing was seen before, by so much at least, has come there.
+_FREE_M, _FREE_SHARE = 0.08, 0.2
+_BINS = 360
+
+
+@dataclass
+class _Seen:
+    measured_s: float
+    points: Points
+
+
+class MotionOfPoints:
+    """Remembers scans, moved with the robot, and finds what of a new one moves."""
+
+    def __init__(self) -> None:
+        self._seen: deque[_Seen] = deque()
+
+    def forget(self) -> None:
+        """Forget all scans."""
+        self._seen.clear()
+
+    def drive(self, velocity: Velocity, seconds: float) -> None:
+        """Take that the robot has moved at ``velocity`` for ``seconds``."""
+        for each in self._seen:
+            each.points = after(velocity, seconds, each.points)
+
+    def see(self, points: Points, measured_s: float) -> Points:
+        """Return the (N, 2) velocities of ``points``, x and y in m/s; zero for all that does not move, or is new."""
+        while self._seen and not measured_s - _MOST_S <= self._seen[0].measured_s < measured_s:
+            self._seen.popleft()
+        while len(self._seen) > 1 and measured_s - self._seen[1].measured_s >= BETWEEN_S - 1e-6:
+            self._seen.popleft()
+        found = np.zeros_like(points)
+        if self._seen and measured_s - self._seen[0].measured_s >= BETWEEN_S / 2:
+            found = drift(points, self._seen[0].points, measured_s - self._seen[0].measured_s)
+        self._seen.append(_Seen(measured_s, points))
+        return found
+
+
+def drift(points: Points, before: Points, seconds: float) -> Points:
+    """Return the (N, 2) velocities of ``points`` in m/s, zero where nothing moves.
+
+    Points next to each other are one thing. A thing not wider than 0.9 m moves if a part of it is where the earlier
+    scan saw further; by how much is found by moving it onto the earlier points (iterative closest points).
+
+    Args:
+        points: Of a scan, (N, 2), in the order of its rays.
+        before: Of an earlier one, (M, 2), in the same frame.
+        seconds: Time between them, above 0.
+    """
+    found = np.zeros_like(points)
+    if len(points) < _FEWEST or len(before) < _FEWEST:
+        return found
+    was_free = _beyond(points, before) > _FREE_M
+    breaks = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) > _APART_M) + 1
+    for part in np.split(np.arange(len(points)), breaks):
+        thing = points[part]
+        if len(part) < _FEWEST or np.ptp(thing, axis=0).max() > _WIDEST_M or was_free[part].mean() < _FREE_SHARE:
+            continue
+        near = before[np.linalg.norm(before - thing.mean(axis=0), axis=1) <= _WIDEST_M + _FASTEST_MPS * seconds]
+        if len(near):
+            velocity = -_moved_onto(thing, near) / seconds
+            speed = float(np.linalg.norm(velocity))
+            if _SLOWEST_MPS <= speed <= _FASTEST_MPS:
+                found[part] = velocity
+    return found
+
+
+def _beyond(points: Points, before: Points) -> Array:
+    """Return how much farther than each of ``points`` the earlier scan saw in its direction, in metres."""
+    ranges = np.full(_BINS, np.inf)
+    bins = _bins(before)
+    order = np.argsort(-np.linalg.norm(before, axis=1))
+    ranges[bins[order]] = np.linalg.norm(before, axis=1)[order]
+    nearest = np.minimum(ranges, np.minimum(np.roll(ranges, 1), np.roll(ranges, -1)))
+    return np.asarray(nearest[_bins(points)] - np.linalg.norm(points, axis=1))
+
+
+def _bins(points: Points) -> np.ndarray:
+    angles = np.arctan2(points[:, 1], points[:, 0])
+    return np.floor((angles / math.tau) * _BINS).astype(int) % _BINS
+
+
+def _moved_onto(thing: Points, before: Points) -> Array:
+    """Return the (2,) way that moves ``thing`` onto ``before``."""
+    way = np.zeros(2)
+    for _ in range(_ROUNDS):
+        here = thing + way
+        distances = np.linalg.norm(here[:, None, :] - before[None, :, :], axis=2)
+        way = way + (before[distances.argmin(axis=1)] - here).mean(axis=0)
+    return way

@@ -1,0 +1,104 @@
+"""Which obstacles of a scan move: people who walk, seen by a robot that drives, among walls that do not."""
+
+import math
+
+import numpy as np
+import pytest
+
+from handsteer.config import CollisionMonitorConfig
+from handsteer.control.footprint import Points
+from handsteer.control.moving import MotionOfPoints, drift
+from handsteer.control.obstacles import ObstacleLimiter
+from handsteer.types import ZERO, Velocity
+
+PERIOD_S = 0.1
+ANGLES = np.radians(np.arange(-180, 180))
+
+
+def scan(x: float, y: float, yaw: float, people: list[tuple[float, float]], walls: bool = True) -> Points:
+    """Return what a scanner at a pose sees of people of 0.25 m radius between walls at y = -1.5 and 1.5."""
+    ways = np.stack([np.cos(ANGLES + yaw), np.sin(ANGLES + yaw)], axis=1)
+    ranges = np.full(len(ANGLES), np.inf)
+    if walls:
+        for wall in (-1.5, 1.5):
+            with np.errstate(divide="ignore"):
+                far = (wall - y) / ways[:, 1]
+            ranges = np.minimum(ranges, np.where(far > 0, far, np.inf))
+    for person in people:
+        to = np.array(person) - (x, y)
+        along = ways @ to
+        across = np.abs(ways[:, 0] * to[1] - ways[:, 1] * to[0])
+        hits = (along > 0) & (across < 0.25)
+        ranges = np.where(hits, np.minimum(ranges, along - np.sqrt(np.maximum(0.25**2 - across**2, 0.0))), ranges)
+    seen = ranges < 8.0
+    points: Points = ranges[seen, None] * np.stack([np.cos(ANGLES[seen]), np.sin(ANGLES[seen])], axis=1)
+    return points
+
+
+def found(
+    people: list[tuple[float, float]], walk: tuple[float, float], robot: Velocity = ZERO
+) -> tuple[Points, Points]:
+    """Return the points, and their velocities, of the last of five scans of people who walk alike."""
+    motion, x, y, yaw = MotionOfPoints(), 0.0, 0.0, 0.0
+    for number in range(5):
+        seconds = number * PERIOD_S
+        now = [(px + walk[0] * seconds, py + walk[1] * seconds) for px, py in people]
+        points = scan(x, y, yaw, now)
+        velocities = motion.see(points, seconds)
+        motion.drive(robot, PERIOD_S)
+        half = yaw + robot.angular_radps * PERIOD_S / 2
+        x += robot.linear_mps * PERIOD_S * math.cos(half)
+        y += robot.linear_mps * PERIOD_S * math.sin(half)
+        yaw += robot.angular_radps * PERIOD_S
+    return points, velocities
+
+
+@pytest.mark.parametrize("walk", [(-0.8, 0.0), (0.0, 0.6), (-0.5, -0.5), (-1.4, 0.0)])
+def test_who_comes_near_or_crosses_is_found_with_their_velocity(walk: tuple[float, float]) -> None:
+    points, velocities = found([(2.5, 0.2)], walk)
+    moves = velocities.any(axis=1)
+    assert moves.sum() >= 5
+    assert np.all(np.linalg.norm(points[moves] - (2.5 + 0.4 * walk[0], 0.2 + 0.4 * walk[1]), axis=1) < 0.3)
+    assert np.linalg.norm(np.median(velocities[moves], axis=0) - walk) < 0.25
+
+
+@pytest.mark.parametrize(
+    "robot", [ZERO, Velocity(0.8, 0.0), Velocity(0.0, 1.5), Velocity(0.6, -1.0)], ids=["still", "on", "turns", "curve"]
+)
+def test_walls_and_people_who_stand_do_not_move_whatever_the_robot_does(robot: Velocity) -> None:
+    _, velocities = found([(2.5, 0.2), (1.5, -0.9), (4.0, 1.0)], (0.0, 0.0), robot)
+    assert not velocities.any()
+
+
+def test_who_walks_is_found_by_a_robot_that_drives() -> None:
+    points, velocities = found([(3.0, 0.2)], (-0.6, 0.0), Velocity(0.8, 0.0))
+    moves = velocities.any(axis=1)
+    assert moves.sum() >= 5
+    assert np.median(velocities[moves, 0]) == pytest.approx(-0.6, abs=0.2)
+    assert np.all(points[moves, 0] < 3.0)
+
+
+def test_old_and_absent_scans_tell_nothing() -> None:
+    near, far = scan(0, 0, 0, [(2.0, 0.0)], walls=False), scan(0, 0, 0, [(2.5, 0.0)], walls=False)
+    motion = MotionOfPoints()
+    assert not motion.see(far, 0.0).any()
+    assert not motion.see(near, 5.0).any()
+    motion.forget()
+    assert not motion.see(near, 5.2).any()
+    assert not drift(near, np.empty((0, 2)), 0.2).any()
+    assert not drift(np.empty((0, 2)), near, 0.2).any()
+
+
+def test_the_robot_stops_for_who_comes_before_it_would_for_who_stands() -> None:
+    """Two metres away: nothing to brake for if it stands, and a hit if it comes at 1.4 m/s."""
+    wanted = Velocity(1.0, 0.0)
+    allowed = {}
+    for walk in (0.0, -1.4):
+        limiter = ObstacleLimiter(CollisionMonitorConfig())
+        for number in range(5):
+            limiter.feel(ZERO, number * PERIOD_S)
+            limiter.see(scan(0, 0, 0, [(2.0 + walk * (number - 4) * PERIOD_S, 0.0)]), number * PERIOD_S)
+        limiter.feel(wanted, 0.4)
+        allowed[walk] = limiter.limit(wanted, 0.4).linear_mps
+    assert allowed[0.0] == 1.0
+    assert allowed[-1.4] < 0.5
