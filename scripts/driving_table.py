@@ -1,10 +1,11 @@
-"""Writes the tables and plots of docs/driving.md: ``make bench-drive``."""
+"""Writes the tables and plots of docs/driving.md: ``make bench-drive``; ``--only assist`` those of the assist."""
 
 import argparse
 import os
 import sys
 import time
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from scripts.doc_tables import replaced, table
@@ -12,7 +13,7 @@ from tqdm import tqdm
 
 from handsteer.plugins.bench.cells import Cell, CellResult, Estimate, run_cells, with_factor
 from handsteer.plugins.bench.courses import COURSES, open_course
-from handsteer.plugins.bench.laps import INTERFACES, Conditions
+from handsteer.plugins.bench.laps import INTERFACES, Conditions, worse
 from handsteer.plugins.bench.plots import write_plots
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -29,13 +30,28 @@ SWEEPS: dict[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
     "errors": (("joystick", "point"), (0, 1, 2, 4)),
     "reaction": (("pad", "joystick"), (150, 250, 400)),
 }
+ASSISTS = ("off", "brake", "steer")
+ASSISTED = ("maze", "doors", "narrow-doors", "corridor")
+DRIVEN = tuple(each for each in INTERFACES if each != "signs_per_second")
+LATE_S = 0.25
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    jobs = parser.parse_args().jobs
+    parser.add_argument("--only", choices=("assist", "driving"))
+    given = parser.parse_args()
     started_s = time.monotonic()
+    laps = 0
+    if given.only != "assist":
+        laps += _driving(given.jobs)
+    if given.only != "driving":
+        laps += _assist(given.jobs)
+    print(f"{laps} laps in {(time.monotonic() - started_s) / 60:.1f} minutes", file=sys.stderr)
+
+
+def _driving(jobs: int) -> int:
+    """Write the tables and plots of all courses without assist; return the number of laps."""
     usual = [Cell(course, of) for course in COURSES for of in INTERFACES if of != "signs_per_second"]
     usual.append(Cell("slalom", "signs_per_second"))
     varied = {
@@ -57,13 +73,47 @@ def main() -> None:
             _pictures(seen, results),
         ]
     )
-    PAGE.write_text(replaced(PAGE.read_text(encoding="utf-8"), "driving", text), encoding="utf-8")
+    _write("driving", text)
     PICTURES.mkdir(parents=True, exist_ok=True)
     for course in COURSES:
         write_plots([results[cell] for cell in usual if cell.course == course], (), PICTURES)
     for factor, row in varied.items():
         write_plots([results[cell] for cell in row], [(factor, ())], PICTURES)
-    print(f"{laps} laps in {(time.monotonic() - started_s) / 60:.1f} minutes", file=sys.stderr)
+    return laps
+
+
+def _write(name: str, text: str) -> None:
+    PAGE.write_text(replaced(PAGE.read_text(encoding="utf-8"), name, text), encoding="utf-8")
+
+
+def _assist(jobs: int) -> int:
+    """Write the tables of what an assist changes; return the number of laps."""
+
+    def cells_of(course: str, conditions: Conditions) -> list[list[Cell]]:
+        return [[Cell(course, of, replace(conditions, assist=each)) for each in ASSISTS] for of in DRIVEN]
+
+    usual, late, bad = Conditions(), Conditions(latency_s=LATE_S), worse(Conditions())
+    parts = {f"`{course}`": cells_of(course, usual) for course in ASSISTED}
+    parts[f"`maze`, {LATE_S * 1000:.0f} ms of latency"] = cells_of("maze", late)
+    parts["`maze`, a worse operator"] = cells_of("maze", bad)
+    parts["`corridor`, a worse operator"] = cells_of("corridor", bad)
+    cells = list(dict.fromkeys(cell for rows in parts.values() for row in rows for cell in row))
+    with tqdm(total=len(cells) * len(SEEDS), unit="lap", disable=None) as bar:
+        results = {each.cell: each for each in run_cells(cells, SEEDS, jobs=jobs, progress=bar.update)}
+    head = [name for each in ASSISTS for name in (f"{each}: time, s", "timed out", "bumps a lap")]
+    text = []
+    for title, rows in parts.items():
+        shown = []
+        for row in rows:
+            found = [results[cell] for cell in row]
+            figures = [
+                (_text(each.median("time_s"), 1), str(each.timed_out or ""), _text(each.mean("bumps"), 2))
+                for each in found
+            ]
+            shown.append([f"`{row[0].interface}`", *(figure for each in figures for figure in each)])
+        text.append(f"### {title}\n\n" + table(["interface", *head], shown))
+    _write("assist", "\n\n".join(text))
+    return len(cells) * len(SEEDS)
 
 
 def _courses() -> str:

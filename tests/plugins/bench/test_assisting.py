@@ -6,7 +6,7 @@ from handsteer.config import Config
 from handsteer.errors import BenchError
 from handsteer.plugins.bench.assisting import Assistance
 from handsteer.plugins.bench.cells import Cell
-from handsteer.plugins.bench.laps import Conditions
+from handsteer.plugins.bench.laps import Conditions, run_lap
 from handsteer.plugins.bench.verb import Varied, _conditions
 from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.robots.world import World
@@ -55,5 +55,17 @@ def test_each_assist_is_a_condition_of_its_own_and_a_row_of_the_table() -> None:
         (0.25, "steer"),
     ]
     assert [_conditions(Cell("maze", "pad", each)) for each in varied] == ["-", "steer", "+250 ms", "+250 ms, steer"]
+    (worse,) = Varied(operator="worse").conditions("off")
+    assert _conditions(Cell("maze", "pad", worse)) == "errors x2, reacts 400 ms, looks away 2000 ms"
     with pytest.raises(BenchError, match="assist: 'push' should be off, brake, steer"):
         Conditions(assist="push")
+
+
+@pytest.mark.slow
+def test_nobody_who_walks_is_touched_by_a_robot_that_moves() -> None:
+    """The operator does not look at them: without assist it touches some of them on each lap but one."""
+    off, brake, steer = (run_lap("corridor", "pad", 2, Conditions(assist=each)) for each in ("off", "brake", "steer"))
+    assert off.bumps > 0
+    assert (brake.bumps, steer.bumps) == (0, 0)
+    assert brake.finished
+    assert steer.finished

@@ -6,7 +6,15 @@ import pytest
 
 from handsteer.plugins.bench.courses import open_course
 from handsteer.plugins.bench.laps import Conditions, run_lap
-from handsteer.plugins.bench.operator import DECISION_S, Operator, Seen, Skill, adapted, projected_displacement
+from handsteer.plugins.bench.operator import (
+    DECISION_S,
+    Attention,
+    Operator,
+    Seen,
+    Skill,
+    adapted,
+    projected_displacement,
+)
 from handsteer.types import ZERO, Pose2D, Velocity
 
 EIGHT = open_course("figure-eight")
@@ -55,6 +63,19 @@ def test_the_operator_stops_at_the_line() -> None:
         x += DECISION_S * speed
     assert x == pytest.approx(6.0, abs=0.1)
     assert speed == 0.0
+
+
+def test_an_operator_who_does_not_look_goes_on_as_before() -> None:
+    attention = Attention(2.0, np.random.default_rng(0))
+    looks = [attention.looks() for _ in range(round(300 / DECISION_S))]
+    gaps = [len(gap) * DECISION_S for gap in "".join(".#"[each] for each in looks).split("#") if gap]
+    assert 10 <= len(gaps) <= 60
+    assert set(np.round(gaps, 2)) <= {1.95, 2.0, 2.05}
+    operator = Operator(STRAIGHT, Skill(), 0.0, np.random.default_rng(0), Attention(2.0, np.random.default_rng(0)))
+    away = Pose2D(2.0, 0.3, 0.2)
+    wanted = [operator.decide(Seen(Pose2D(1.0, 0.0, 0.0), ZERO)) for _ in range(looks.index(False))]
+    assert {operator.decide(Seen(away, ZERO)) for _ in range(30)} == {wanted[-1]}
+    assert [Attention(0.0, np.random.default_rng(0)).looks() for _ in range(1000)] == [True] * 1000
 
 
 def test_with_delay_the_pace_falls_and_the_ratio_of_gains_rises() -> None:

@@ -22,6 +22,7 @@ FACTORS: Mapping[str, tuple[str, float]] = {
     "fps": ("fps", 1.0),
     "errors": ("errors", 1.0),
     "reaction": ("reaction_s", 1e-3),
+    "gaps": ("gaps_s", 1e-3),
 }
 """What sweeps vary: the field of :class:`~handsteer.plugins.bench.laps.Conditions`, and its unit; times are in ms."""
 

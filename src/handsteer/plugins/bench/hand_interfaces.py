@@ -31,7 +31,9 @@ _PATIENCE_S = 0.3
 _LINEAR_MPS, _ANGULAR_RADPS = 0.15, 0.5
 
 _LOOKS_S, _LEARNS, _TRIM_RAD = 0.4, 0.1, 0.2
-_TURNS_MPS, _ENDS_MPS = 0.05, 0.13
+_TURNS_MPS = 0.05
+# Below, the palm is shown: it takes 0.2 s to be shown and confirmed.
+_ENDS_MPS = 0.24
 _FRAME_M = 0.46
 
 _OPEN_S = 0.45

@@ -15,7 +15,7 @@ from handsteer.plugins.bench.hand_interfaces import Joystick, Point, Signs
 from handsteer.plugins.bench.hand_view import HandView, LandmarkErrors, Through
 from handsteer.plugins.bench.hands import Slips
 from handsteer.plugins.bench.interfaces import TICK_S, Gamepad, Interface, Keys, Pad, Sliders, top_speed
-from handsteer.plugins.bench.operator import DECISION_S, REACTION_S, Operator, Seen, Skill, adapted
+from handsteer.plugins.bench.operator import DECISION_S, REACTION_S, Attention, Operator, Seen, Skill, adapted
 from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.robots import RobotState
 from handsteer.robots.course import Referee
@@ -25,6 +25,7 @@ TIMEOUT_S = 180.0
 """A lap that takes longer from the start gate on has failed, and counts with this time."""
 
 _UNSTARTED_S = 60.0
+_LATEST_S = 30.0
 _STANDS_S, _STANDS_MPS, _STANDS_RADPS = 0.5, 0.02, 0.05
 _ASIDE_M = 0.3
 _TRACE_TICKS = 10
@@ -36,6 +37,7 @@ _LIMITS = (
     ("fps", "frames per second", 1.0, 5, 120),
     ("errors", "factor on errors", 1.0, 0, 20),
     ("reaction_s", "reaction time in ms", 1e-3, 0, 2000),
+    ("gaps_s", "gaps of attention in ms", 1e-3, 0, 10_000),
 )
 
 
@@ -48,6 +50,7 @@ class Conditions:
         fps: Frames per second of the camera of the hand.
         errors: Factor on errors of landmarks and on the operator's slips.
         reaction_s: The operator's reaction time.
+        gaps_s: For so long, now and then, the operator does not look, and goes on as before.
         through: How the hand is seen.
         assist: Whether the control brakes or steers before obstacles.
     """
@@ -56,6 +59,7 @@ class Conditions:
     fps: float = 30.0
     errors: float = 1.0
     reaction_s: float = REACTION_S
+    gaps_s: float = 0.0
     through: Through = "landmarks"
     assist: str = "off"
 
@@ -70,6 +74,11 @@ class Conditions:
             raise BenchError(f"assist: {self.assist!r} should be {', '.join(ASSISTS)}")
 
 
+def worse(conditions: Conditions) -> Conditions:
+    """Return ``conditions`` with an operator who reacts in 0.4 s, errs twice as often, and looks away for 2 s."""
+    return replace(conditions, reaction_s=0.4, errors=2 * conditions.errors, gaps_s=2.0)
+
+
 @dataclass(frozen=True)
 class Lap:
     """The result of one lap.
@@ -80,7 +89,7 @@ class Lap:
         time_s: From the start gate to the finish, or to rest at the place to stop at.
         gates: Number of gates passed.
         missed: Number of gates missed.
-        bumps: How often the robot began to touch an obstacle.
+        bumps: How often the robot began to touch an obstacle while it moved; people also walk into one that stands.
         path_ratio: Length of the path driven, divided by that of the ideal path.
         cross_track_m: Root mean square of the distance from the ideal path.
         overshoot_m: How far beyond the place to stop at the robot came, >= 0; None if there is none.
@@ -206,14 +215,18 @@ class _Run:
         self._referee = Referee(course.gates)
         half_s = conditions.latency_s / 2
         random = np.random.default_rng([seed, 0])
-        self._operator = Operator(course, skill, conditions.reaction_s + half_s, random)
+        # So that each lap meets the people of the world elsewhere.
+        walks = any(thing.route for thing in course.world.obstacles)
+        self._later_s = float(random.uniform(0.0, _LATEST_S)) if walks else 0.0
+        attention = Attention(conditions.gaps_s, np.random.default_rng([seed, 2]))
+        self._operator = Operator(course, skill, conditions.reaction_s + half_s, random, attention)
         self._on_the_way: deque[tuple[int, Velocity]] = deque()
         self._delay_ticks = round((interface.delay_s + half_s) / TICK_S)
         self._tick = 0
         self._measures = _Measures(course)
 
     def run(self, trace: list[Pose2D] | None) -> Lap:
-        state = self._robot.step(0.0)
+        state = self._robot.step(self._later_s)
         course = self._referee.step(state.truth, 0, state.time_s)
         while not self._measures.is_over(course, state):
             if self._tick % _DECISION_TICKS == 0:
@@ -254,7 +267,8 @@ class _Measures:
         self._still = 0
         self._overshoot_m = 0.0
         self._s_m = 0.0
-        self._bumps_before = self._bumps = 0
+        self._touches = self._bumps = 0
+        self._moved = False
 
     def note(self, course: CourseState, state: RobotState, changes: int) -> None:
         """Take the state after one tick."""
@@ -263,12 +277,15 @@ class _Measures:
         self._s_m = float(self._course.path.s[here])
         stands = abs(state.linear_mps) < _STANDS_MPS and abs(state.angular_radps) < _STANDS_RADPS
         self._still = self._still + 1 if stands else 0
+        touches = (state.collisions or 0) - self._touches
+        bumps = touches if self._moved else 0
+        self._touches, self._moved = self._touches + touches, not stands
         if course.phase == "ready":
             self._waited += 1
-            self._changes_before, self._bumps_before = changes, state.collisions or 0
+            self._changes_before = changes
             return
         self._ticks += 1
-        self._changes, self._bumps = changes, state.collisions or 0
+        self._changes, self._bumps = changes, self._bumps + bumps
         self._stood += stands
         if self._before is not None:
             self._length_m += float(np.hypot(pose.x - self._before[0], pose.y - self._before[1]))
@@ -303,7 +320,7 @@ class _Measures:
             time_s=time_s,
             gates=course.passed,
             missed=course.gates - course.passed,
-            bumps=self._bumps - self._bumps_before,
+            bumps=self._bumps,
             path_ratio=self._length_m / self._course.length_m,
             cross_track_m=float(np.sqrt(self._squares / ticks)),
             overshoot_m=self._overshoot_m if self._course.world.stop else None,

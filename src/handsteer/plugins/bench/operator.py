@@ -33,6 +33,7 @@ _TURNS_RAD = 0.9
 _STUCK_S, _STUCK_M = 1.0, 0.06
 _BACK_M, _BACK_MPS = 0.35, 0.25
 _PATIENT_S = 0.7
+_LOOKS_S, _BETWEEN_GAPS_S = 4.0, 10.0
 
 # Perception: errors of the seen place, heading, and speed, which change slowly (an Ornstein-Uhlenbeck process).
 _SEEN_M, _SEEN_RAD, _SEEN_S = 0.02, math.radians(1.5), 0.5
@@ -84,6 +85,29 @@ def adapted(skill: Skill, delay_s: float) -> Skill:
     return replace(skill, pace_mps=skill.pace_mps / (1.0 + delay_s / _PATIENCE_S), kd=kd)
 
 
+class Attention:
+    """Whether the operator looks; else what was wanted last is wanted further.
+
+    Args:
+        gap_s: Length of a gap; 0 for an operator who always looks.
+        random: Source of the times between two gaps, which are 4 s and more, 10 s in the mean.
+    """
+
+    def __init__(self, gap_s: float, random: np.random.Generator) -> None:
+        self._gap_s, self._random = gap_s, random
+        self._left_s = self._next_s()
+
+    def looks(self) -> bool:
+        """Advance time by :data:`DECISION_S`; return whether the operator looks."""
+        self._left_s -= DECISION_S
+        if self._left_s <= -self._gap_s:
+            self._left_s = self._next_s()
+        return not self._gap_s or self._left_s > 0.0
+
+    def _next_s(self) -> float:
+        return _LOOKS_S + float(self._random.exponential(_BETWEEN_GAPS_S - _LOOKS_S))
+
+
 class Operator:
     """Wants a velocity, from what was seen a delay ago.
 
@@ -92,13 +116,23 @@ class Operator:
         skill: Gains and pace.
         delay_s: Reaction time, and how late the picture of the robot is, in seconds.
         random: Source of the errors of perception.
+        attention: When the operator looks; always if None.
     """
 
-    def __init__(self, course: Course, skill: Skill, delay_s: float, random: np.random.Generator) -> None:
+    def __init__(
+        self,
+        course: Course,
+        skill: Skill,
+        delay_s: float,
+        random: np.random.Generator,
+        attention: Attention | None = None,
+    ) -> None:
         self._course, self._path, self._skill = course, course.path, skill
         self._late: deque[Seen] = deque(maxlen=1 + round(delay_s / DECISION_S))
         self._delay_s = delay_s
         self._random = random
+        self._attention = attention or Attention(0.0, np.random.default_rng(0))
+        self._wanted = ZERO
         self._errors = np.zeros(3)
         self._s_m = 0.0
         self._before: float | None = None
@@ -114,6 +148,11 @@ class Operator:
         """
         self._late.append(seen)
         self._decisions += 1
+        if self._attention.looks():
+            self._wanted = self._decided()
+        return self._wanted
+
+    def _decided(self) -> Velocity:
         if len(self._late) < (self._late.maxlen or 1):
             return ZERO
         then = self._perceived(self._late[0])

@@ -56,9 +56,12 @@ class Varied:
         Frames per second of the camera of the hand.
     sweep
         Vary one condition, such as latency=0,250,500,750 (ms), fps=10,15,30,60, errors=0,1,2,4 (factor on the errors
-        of landmarks and operator) or reaction=150,250,400 (ms); may be repeated.
+        of landmarks and operator), reaction=150,250,400 (ms) or gaps=0,1000,2000 (ms, for which the operator does not
+        look, now and then); may be repeated.
     assist
         off, brake or steer, as control.assist; may be repeated. By default control.assist.
+    operator
+        worse reacts in 0.4 s instead of 0.25, errs twice as often, and now and then looks away for 2 s.
     """
 
     through: Literal["landmarks", "pictures"] = "landmarks"
@@ -66,6 +69,7 @@ class Varied:
     fps: float = 30.0
     sweep: Words = None
     assist: Words = None
+    operator: Literal["good", "worse"] = "good"
 
     def sweeps(self) -> "list[tuple[str, list[float]]]":
         """Return each condition that is varied, with its values."""
@@ -76,9 +80,10 @@ class Varied:
     def conditions(self, assist: str) -> "list[Conditions]":
         """Return all conditions to drive under; ``assist`` where none is named."""
         from handsteer.plugins.bench.cells import with_factor
-        from handsteer.plugins.bench.laps import Conditions
+        from handsteer.plugins.bench.laps import Conditions, worse
 
         usual = Conditions(latency_s=self.latency / 1000, fps=self.fps, through=self.through)
+        usual = worse(usual) if self.operator == "worse" else usual
         varied = [with_factor(usual, factor, value) for factor, values in self.sweeps() for value in values] or [usual]
         return [replace(each, assist=kind) for each in varied for kind in self.assist or [assist]]
 
@@ -109,8 +114,8 @@ def bench(
     Parameters
     ----------
     course
-        Course to drive: slalom, figure-eight, stop-line, parking, maze, doors, roundabout, warehouse, or a world file
-        with gates; may be repeated. By default the slalom; with --all the first five.
+        Course to drive: slalom, figure-eight, stop-line, parking, maze, doors, narrow-doors, corridor, roundabout,
+        warehouse, or a world file with gates; may be repeated. By default the slalom; with --all the first five.
     interface
         signs, signs_per_second, joystick, point, pad, keys, sliders or gamepad; may be repeated. All by default.
     all
@@ -226,6 +231,7 @@ def _conditions(cell: "Cell") -> str:
         "fps": f"{found.fps:g}/s",
         "errors": f"errors x{found.errors:g}",
         "reaction_s": f"reacts {1000 * found.reaction_s:.0f} ms",
+        "gaps_s": f"looks away {1000 * found.gaps_s:.0f} ms",
         "through": found.through,
         "assist": found.assist,
     }
