@@ -31,7 +31,7 @@ SWEEPS: dict[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
     "reaction": (("pad", "joystick"), (150, 250, 400)),
 }
 ASSISTS = ("off", "brake", "steer")
-ASSISTED = ("maze", "doors", "narrow-doors", "corridor")
+ASSISTED = ("maze", "narrow-doors", "corridor")
 DRIVEN = tuple(each for each in INTERFACES if each != "signs_per_second")
 LATE_S = 0.25
 
@@ -89,20 +89,21 @@ def _write(name: str, text: str) -> None:
 def _assist(jobs: int) -> int:
     """Write the tables of what an assist changes; return the number of laps."""
 
-    def cells_of(course: str, conditions: Conditions) -> list[list[Cell]]:
-        return [[Cell(course, of, replace(conditions, assist=each)) for each in ASSISTS] for of in DRIVEN]
+    def rows_of(course: str, conditions: Conditions, assists: Sequence[str]) -> list[list[Cell]]:
+        return [[Cell(course, of, replace(conditions, assist=each)) for each in assists] for of in DRIVEN]
 
     usual, late, bad = Conditions(), Conditions(latency_s=LATE_S), worse(Conditions())
-    parts = {f"`{course}`": cells_of(course, usual) for course in ASSISTED}
-    parts[f"`maze`, {LATE_S * 1000:.0f} ms of latency"] = cells_of("maze", late)
-    parts["`maze`, a worse operator"] = cells_of("maze", bad)
-    parts["`corridor`, a worse operator"] = cells_of("corridor", bad)
-    cells = list(dict.fromkeys(cell for rows in parts.values() for row in rows for cell in row))
+    ends = (ASSISTS[0], ASSISTS[-1])
+    parts: dict[str, tuple[Sequence[str], list[list[Cell]]]]
+    parts = {f"`{course}`": (ASSISTS, rows_of(course, usual, ASSISTS)) for course in ASSISTED}
+    parts[f"`maze`, {LATE_S * 1000:.0f} ms of latency"] = ends, rows_of("maze", late, ends)
+    parts["`maze`, a worse operator"] = ends, rows_of("maze", bad, ends)
+    cells = list(dict.fromkeys(cell for _, rows in parts.values() for row in rows for cell in row))
     with tqdm(total=len(cells) * len(SEEDS), unit="lap", disable=None) as bar:
         results = {each.cell: each for each in run_cells(cells, SEEDS, jobs=jobs, progress=bar.update)}
-    head = [name for each in ASSISTS for name in (f"{each}: time, s", "timed out", "bumps a lap")]
     text = []
-    for title, rows in parts.items():
+    for title, (assists, rows) in parts.items():
+        head = [name for each in assists for name in (f"{each}: time, s", "timed out", "bumps a lap")]
         shown = []
         for row in rows:
             found = [results[cell] for cell in row]
