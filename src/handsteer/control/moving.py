@@ -5,6 +5,7 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handsteer.control.footprint import Array, Points, after
 from handsteer.types import Velocity
@@ -25,6 +26,7 @@ _BINS = 360
 class _Seen:
     measured_s: float
     points: Points
+    origin: Points
 
 
 class MotionOfPoints:
@@ -41,6 +43,7 @@ class MotionOfPoints:
         """Take that the robot has moved at ``velocity`` for ``seconds``."""
         for each in self._seen:
             each.points = after(velocity, seconds, each.points)
+            each.origin = after(velocity, seconds, each.origin)
 
     def see(self, points: Points, measured_s: float) -> Points:
         """Return the (N, 2) velocities of ``points``, x and y in m/s; zero for all that does not move, or is new."""
@@ -50,12 +53,13 @@ class MotionOfPoints:
             self._seen.popleft()
         found = np.zeros_like(points)
         if self._seen and measured_s - self._seen[0].measured_s >= BETWEEN_S / 2:
-            found = drift(points, self._seen[0].points, measured_s - self._seen[0].measured_s)
-        self._seen.append(_Seen(measured_s, points))
+            before = self._seen[0]
+            found = drift(points, before.points, before.origin, measured_s - before.measured_s)
+        self._seen.append(_Seen(measured_s, points, np.zeros((1, 2))))
         return found
 
 
-def drift(points: Points, before: Points, seconds: float) -> Points:
+def drift(points: Points, before: Points, origin: Points, seconds: float) -> Points:
     """Return the (N, 2) velocities of ``points`` in m/s, zero where nothing moves.
 
     Points next to each other are one thing. A thing not wider than 0.9 m moves if a part of it is where the earlier
@@ -64,12 +68,13 @@ def drift(points: Points, before: Points, seconds: float) -> Points:
     Args:
         points: Of a scan, (N, 2), in the order of its rays.
         before: Of an earlier one, (M, 2), in the same frame.
+        origin: Where the robot was then, (1, 2).
         seconds: Time between them, above 0.
     """
     found = np.zeros_like(points)
     if len(points) < _FEWEST or len(before) < _FEWEST:
         return found
-    was_free = _beyond(points, before) > _FREE_M
+    was_free = _was_free(points, before, origin)
     breaks = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) > _APART_M) + 1
     for part in np.split(np.arange(len(points)), breaks):
         thing = points[part]
@@ -84,8 +89,22 @@ def drift(points: Points, before: Points, seconds: float) -> Points:
     return found
 
 
+def _was_free(points: Points, before: Points, origin: Points) -> NDArray[np.bool_]:
+    """Return which of ``points`` (N, 2) are where the earlier scan saw further, and away from all that it saw."""
+    free = _beyond(points - origin, before - origin) > _FREE_M
+    # The next ray on a wall that is seen at a flat angle goes much further, too.
+    free[free] = _distances(points[free], before).min(axis=1) > _FREE_M
+    return free
+
+
+def _distances(points: Points, others: Points) -> Array:
+    """Return the (N, M) distances of ``points`` from ``others``."""
+    found: Array = np.linalg.norm(points[:, None, :] - others[None, :, :], axis=2)
+    return found
+
+
 def _beyond(points: Points, before: Points) -> Array:
-    """Return how much farther than each of ``points`` the earlier scan saw in its direction, in metres."""
+    """Return how much farther than each of ``points`` the earlier scan saw in its direction; both as seen from there."""
     ranges = np.full(_BINS, np.inf)
     bins = _bins(before)
     order = np.argsort(-np.linalg.norm(before, axis=1))
@@ -94,7 +113,7 @@ def _beyond(points: Points, before: Points) -> Array:
     return np.asarray(nearest[_bins(points)] - np.linalg.norm(points, axis=1))
 
 
-def _bins(points: Points) -> np.ndarray:
+def _bins(points: Points) -> NDArray[np.int64]:
     angles = np.arctan2(points[:, 1], points[:, 0])
     return np.floor((angles / math.tau) * _BINS).astype(int) % _BINS
 
@@ -104,6 +123,5 @@ def _moved_onto(thing: Points, before: Points) -> Array:
     way = np.zeros(2)
     for _ in range(_ROUNDS):
         here = thing + way
-        distances = np.linalg.norm(here[:, None, :] - before[None, :, :], axis=2)
-        way = way + (before[distances.argmin(axis=1)] - here).mean(axis=0)
+        way = way + (before[_distances(here, before).argmin(axis=1)] - here).mean(axis=0)
     return way
