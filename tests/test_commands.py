@@ -24,8 +24,10 @@ FPS, VIDEO_S, DRIVE_S, LEAST_M = 30, 5, 8, 0.1
 ELSEWHERE = {
     "--camera 0": "tests/cameras: a webcam",
     "--camera rtsp:": "tests/cameras: a stream of the network",
+    "--camera tcp:": "tests/cameras/test_webcam.py: the JPEGs of a camera program",
     "--camera browser": "tests/plugins/page/test_webcam.py and test_first_visit_in_browser.py",
     "--robot turtlebot4": "tests/ros2 and tests/dds: a robot of ROS 2",
+    "--robot ros2": "tests/ros2: a robot of ROS 2",
     "--robot auto": "tests/dds: a robot of ROS 2",
     "--robot dds": "tests/dds: a robot of ROS 2",
     "--robot ros1": "tests/ros1: a robot of ROS 1",

@@ -75,10 +75,15 @@ def drift(points: Points, before: Points, origin: Points, seconds: float) -> Poi
     if len(points) < _FEWEST or len(before) < _FEWEST:
         return found
     was_free = _was_free(points, before, origin)
-    breaks = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) > _APART_M) + 1
-    for part in np.split(np.arange(len(points)), breaks):
+    if not was_free.any():
+        return found
+    things = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1) > _APART_M)])
+    counts = np.bincount(things)
+    came = np.bincount(things, weights=was_free) >= np.maximum(_FREE_SHARE * counts, 1)
+    for number in np.flatnonzero(came & (counts >= _FEWEST)):
+        part = things == number
         thing = points[part]
-        if len(part) < _FEWEST or np.ptp(thing, axis=0).max() > _WIDEST_M or was_free[part].mean() < _FREE_SHARE:
+        if np.ptp(thing, axis=0).max() > _WIDEST_M:
             continue
         near = before[np.linalg.norm(before - thing.mean(axis=0), axis=1) <= _WIDEST_M + _FASTEST_MPS * seconds]
         if len(near):
@@ -104,7 +109,7 @@ def _distances(points: Points, others: Points) -> Array:
 
 
 def _beyond(points: Points, before: Points) -> Array:
-    """Return how much farther than each of ``points`` the earlier scan saw in its direction; both as seen from there."""
+    """Return how much farther than each of ``points`` the earlier scan saw in its direction; both seen from there."""
     ranges = np.full(_BINS, np.inf)
     bins = _bins(before)
     order = np.argsort(-np.linalg.norm(before, axis=1))
