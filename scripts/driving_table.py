@@ -30,9 +30,10 @@ SWEEPS: dict[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
     "errors": (("joystick", "point"), (0, 1, 2, 4)),
     "reaction": (("pad", "joystick"), (150, 250, 400)),
 }
+FINE = ("joystick", "point", "pad")
 ASSISTS = ("off", "brake", "steer")
-ASSISTED = ("maze", "narrow-doors", "corridor")
 DRIVEN = tuple(each for each in INTERFACES if each != "signs_per_second")
+ASSISTED = {"maze": DRIVEN, "narrow-doors": ("signs", *FINE), "corridor": ("signs", *FINE)}
 LATE_S = 0.25
 
 
@@ -90,7 +91,7 @@ def _assist(jobs: int) -> int:
     """Write the tables of what an assist changes; return the number of laps."""
 
     def rows_of(course: str, conditions: Conditions, assists: Sequence[str]) -> list[list[Cell]]:
-        return [[Cell(course, of, replace(conditions, assist=each)) for each in assists] for of in DRIVEN]
+        return [[Cell(course, of, replace(conditions, assist=each)) for each in assists] for of in ASSISTED[course]]
 
     usual, late, bad = Conditions(), Conditions(latency_s=LATE_S), worse(Conditions())
     ends = (ASSISTS[0], ASSISTS[-1])
