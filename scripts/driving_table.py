@@ -104,15 +104,15 @@ def _assist(jobs: int) -> int:
         results = {each.cell: each for each in run_cells(cells, SEEDS, jobs=jobs, progress=bar.update)}
     text = []
     for title, (assists, rows) in parts.items():
-        head = [name for each in assists for name in (f"{each}: time, s", "timed out", "bumps a lap")]
+        head = [name for each in assists for name in (f"{each}, s", "bumps a lap")]
         shown = []
         for row in rows:
-            found = [results[cell] for cell in row]
-            figures = [
-                (_text(each.median("time_s"), 1), str(each.timed_out or ""), _text(each.mean("bumps"), 2))
-                for each in found
-            ]
-            shown.append([f"`{row[0].interface}`", *(figure for each in figures for figure in each)])
+            figures = []
+            for cell in row:
+                result = results[cell]
+                late = f"; {result.timed_out} timed out" if result.timed_out else ""
+                figures += [_text(result.median("time_s"), 1) + late, _text(result.mean("bumps"), 2)]
+            shown.append([f"`{row[0].interface}`", *figures])
         text.append(f"### {title}\n\n" + table(["interface", *head], shown))
     _write("assist", "\n\n".join(text))
     return len(cells) * len(SEEDS)
