@@ -110,8 +110,8 @@ def _assist(jobs: int) -> int:
             figures = []
             for cell in row:
                 result = results[cell]
-                late = f"; {result.timed_out} timed out" if result.timed_out else ""
-                figures += [_text(result.median("time_s"), 1) + late, _text(result.mean("bumps"), 2)]
+                over = f"; {result.timed_out} timed out" if result.timed_out else ""
+                figures += [_text(result.median("time_s"), 1) + over, _text(result.mean("bumps"), 2)]
             shown.append([f"`{row[0].interface}`", *figures])
         text.append(f"### {title}\n\n" + table(["interface", *head], shown))
     _write("assist", "\n\n".join(text))
