@@ -1090,7 +1090,9 @@ def test_while_it_is_deactivated_it_commands_nothing_and_then_waits_for_neutral(
     bench.show("NONE", *["Forward"] * 20)
     bench.run(1.0)
     bench.control.reconfigure(Config(control=ControlConfig(max_linear=0.5)))
-    bench.run(0.1)
+    for is_stopped in (True, False):  # each commands zero while it is active
+        bench.stop.publish(Bool(data=is_stopped))
+        bench.run(0.1)
     assert len(twists) == silent
     assert bench.control.set_active(True)
     bench.show(*["Forward"] * 20)
