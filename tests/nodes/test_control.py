@@ -1090,15 +1090,23 @@ def test_while_it_is_deactivated_it_commands_nothing_and_then_waits_for_neutral(
     bench.show("NONE", *["Forward"] * 20)
     bench.run(1.0)
     bench.control.reconfigure(Config(control=ControlConfig(max_linear=0.5)))
-    for is_stopped in (True, False):  # each commands zero while it is active
-        bench.stop.publish(Bool(data=is_stopped))
-        bench.run(0.1)
     assert len(twists) == silent
     assert bench.control.set_active(True)
     bench.show(*["Forward"] * 20)
     assert {twist.linear.x for twist in twists[silent:]} == {0.0}
     bench.show(*["Stop"] * 20, *["Forward"] * 5)
     assert twists[-1].linear.x > 0.0
+
+
+def test_a_stop_while_it_is_deactivated_commands_nothing() -> None:
+    bench = ControlBench()
+    twists = bench.record(CMD_VEL)
+    bench.control.set_active(False)
+    silent = len(twists)
+    for is_stopped in (True, False):  # each commands zero while it is active
+        bench.stop.publish(Bool(data=is_stopped))
+        bench.run(0.1)
+    assert len(twists) == silent
 
 
 def test_steering_that_was_held_while_it_was_deactivated_must_be_released() -> None:
