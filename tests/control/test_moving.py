@@ -97,6 +97,14 @@ def test_old_and_absent_scans_tell_nothing() -> None:
     assert not drift(np.empty((0, 2)), near, np.zeros((1, 2)), 0.2).any()
 
 
+def test_no_more_than_a_few_scans_are_remembered_however_many_come() -> None:
+    motion = MotionOfPoints()
+    for number in range(2000):
+        velocities = motion.see(scan(0, 0, 0, [(2.5 - 0.8e-3 * number, 0.2)], walls=False), 1e-3 * number)
+    assert np.median(velocities[velocities.any(axis=1), 0]) == pytest.approx(-0.8, abs=0.2)
+    assert len(motion._seen) <= 15
+
+
 def test_the_robot_stops_for_who_comes_before_it_would_for_who_stands() -> None:
     """Two metres away: nothing to brake for if it stands, and a hit if it comes at 1.4 m/s."""
     wanted = Velocity(1.0, 0.0)

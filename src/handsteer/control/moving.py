@@ -14,6 +14,7 @@ BETWEEN_S = 0.25
 """Scans are compared with one that is so much older, in seconds, or a little more: in that time people go 0.3 m."""
 
 _MOST_S = 0.6
+_LEAST_S = 0.04  # between two that are remembered: at most 15 of them
 _APART_M, _WIDEST_M, _FEWEST = 0.2, 0.9, 3
 _SLOWEST_MPS, _FASTEST_MPS = 0.2, 2.0
 _ROUNDS = 4
@@ -55,7 +56,8 @@ class MotionOfPoints:
         if self._seen and measured_s - self._seen[0].measured_s >= BETWEEN_S / 2:
             before = self._seen[0]
             found = drift(points, before.points, before.origin, measured_s - before.measured_s)
-        self._seen.append(_Seen(measured_s, points, np.zeros((1, 2))))
+        if not self._seen or measured_s - self._seen[-1].measured_s >= _LEAST_S:
+            self._seen.append(_Seen(measured_s, points, np.zeros((1, 2))))
         return found
 
 
@@ -98,13 +100,17 @@ def _was_free(points: Points, before: Points, origin: Points) -> NDArray[np.bool
     """Return which of ``points`` (N, 2) are where the earlier scan saw further, and away from all that it saw."""
     free = _beyond(points - origin, before - origin) > _FREE_M
     # The next ray on a wall that is seen at a flat angle goes much further, too.
-    free[free] = _distances(points[free], before).min(axis=1) > _FREE_M
+    free[free] = _squares(points[free], before).min(axis=1) > _FREE_M**2
     return free
 
 
-def _distances(points: Points, others: Points) -> Array:
-    """Return the (N, M) distances of ``points`` from ``others``."""
-    found: Array = np.linalg.norm(points[:, None, :] - others[None, :, :], axis=2)
+def _squares(points: Points, others: Points) -> Array:
+    """Return the (N, M) squares of the distances of ``points`` from ``others``."""
+    x, y = (points[:, axis, None] - others[None, :, axis] for axis in range(2))
+    x *= x
+    y *= y
+    x += y
+    found: Array = x
     return found
 
 
@@ -128,5 +134,5 @@ def _moved_onto(thing: Points, before: Points) -> Array:
     way = np.zeros(2)
     for _ in range(_ROUNDS):
         here = thing + way
-        way = way + (before[_distances(here, before).argmin(axis=1)] - here).mean(axis=0)
+        way = way + (before[_squares(here, before).argmin(axis=1)] - here).mean(axis=0)
     return way
