@@ -12,6 +12,7 @@ from handsteer.parameters import section_model
 from handsteer.plugins.page.elements import STATIC
 from handsteer.plugins.page.languages import LANGUAGES, preferred_language
 from handsteer.plugins.page.settings_fields import FIELDS, SECTION_TITLES
+from handsteer.robots.world import load_world, shipped_worlds
 from handsteer.types import EFFECTS, SIGNS
 
 OTHERS = sorted(LANGUAGES - {"en"})
@@ -75,3 +76,11 @@ def test_parameters_signs_and_effects_are_translated(language: str) -> None:
     shown += [*SECTION_TITLES.values(), *SIGNS, *EFFECTS.values()]
     shown += sorted({(section_model(field.section).__doc__ or "").partition("\n")[0] for field in FIELDS.values()})
     assert [words for words in shown if not is_known(words, language)] == []
+
+
+@pytest.mark.parametrize("language", OTHERS)
+@pytest.mark.parametrize("world", shipped_worlds())
+def test_the_names_of_shipped_worlds_and_of_what_is_in_them_are_translated(world: str, language: str) -> None:
+    found = load_world(world)
+    names = {world, *(thing.name for thing in found.obstacles), *(gate.name for gate in found.gates)}
+    assert {name for name in names if not is_known(name, language)} == set()
