@@ -125,6 +125,11 @@ def drifted(seen: tuple[Array, Array], poses: Array, times_s: Array, drift: Poin
     return seen[0] + times_s[:, None] * x, seen[1] + times_s[:, None] * y
 
 
+def quickest_mps(drift: Points | None) -> float:
+    """Return the speed of the quickest of points that move at ``drift`` (N, 2) m/s; 0 if it is None."""
+    return 0.0 if drift is None or not len(drift) else float(np.sqrt((drift * drift).sum(axis=1).max()))
+
+
 def after(velocity: Velocity, seconds: float, points: Array) -> Array:
     """Return ``points``, (N, 2), relative to a robot that has moved at constant ``velocity`` for ``seconds``."""
     if velocity.is_zero or not seconds:

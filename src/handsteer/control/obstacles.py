@@ -23,6 +23,7 @@ from handsteer.control.footprint import (
     gaps,
     least_gaps,
     on_a_circle,
+    quickest_mps,
     reach_m,
     seen_from,
 )
@@ -202,7 +203,7 @@ def _met_while_braking(
     if fastest < _NOTHING_MPS:
         return None
     # A robot that reverses its direction stops on the way, and has to stop again.
-    times_s = steps_s(fastest, rule.reaction_time + _braking_s(highest, rule))
+    times_s = steps_s(fastest + quickest_mps(drift), rule.reaction_time + _braking_s(highest, rule))
     poses = braking(moving, target, rule, rule.reaction_time, times_s)
     pad_m = _PAD_M + _PAD_S * fastest
     return met(poses, times_s, points, rule, pad_m=pad_m, fastest_mps=fastest, drift=drift)
@@ -212,7 +213,7 @@ def steps_s(fastest_mps: float, seconds: float) -> Points:
     """Return times from 0 to ``seconds``, (K,), between which the fastest corner moves by 3 cm, or more if it is far.
 
     Args:
-        fastest_mps: Speed of the fastest corner, above 0.
+        fastest_mps: Speed of the fastest corner, above 0; plus that of what comes, if anything moves.
         seconds: The last of them, above 0.
     """
     steps = min(max(math.ceil(fastest_mps * seconds / _STEP_M), _FEWEST_STEPS), _MOST_STEPS)
@@ -245,7 +246,7 @@ def met(
     seen = seen_from(poses[1::3], points)
     if drift is not None:
         seen = drifted(seen, poses[1::3], times_s[1::3], drift)
-        beyond_m += _ROUGHLY * float(np.linalg.norm(drift, axis=1).max()) * float(times_s[1])
+        beyond_m += _ROUGHLY * quickest_mps(drift) * float(times_s[1])
     is_near = least_gaps(*seen, rule).min(axis=0) <= beyond_m
     near = points[is_near]
     if not len(near):

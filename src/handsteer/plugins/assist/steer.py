@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.control.assist import TURNS_RADPS, Around
-from handsteer.control.footprint import braking, fastest_mps, reach_m
+from handsteer.control.footprint import braking, fastest_mps, quickest_mps, reach_m
 from handsteer.control.obstacles import Hit, met, steps_s
 from handsteer.types import Velocity
 
@@ -114,7 +114,7 @@ def _hit(target: Velocity, way_m: float, around: Around) -> Hit | None:
     if not len(around.points):
         return None
     clear_s = max(CLEAR_S, min(way_m / abs(target.linear_mps), _LONGEST_S))
-    times_s = steps_s(fastest, clear_s)
+    times_s = steps_s(fastest + quickest_mps(around.drift), clear_s)
     poses = braking(moving, target, rule, clear_s, times_s)
     pad_m = PAD_M + _PAD_S * fastest
     return met(poses, times_s, around.points, rule, pad_m=pad_m, fastest_mps=fastest, drift=around.drift)
