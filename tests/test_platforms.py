@@ -29,8 +29,9 @@ modules = [
 for name in modules.copy():
     try:
         importlib.import_module(name)
-    except ModuleNotFoundError as missing:
-        if missing.name not in {ros!r}:
+    except Exception as problem:  # or an error of ours that says what to install
+        missing = problem if isinstance(problem, ModuleNotFoundError) else problem.__context__
+        if getattr(missing, "name", None) not in {ros!r}:
             raise
         modules.remove(name)
 for name in [name for name in sys.modules if name.partition(".")[0] == "handsteer"]:

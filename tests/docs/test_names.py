@@ -25,7 +25,7 @@ OF_CONTAINERS = {"--network", "--device"}
 FOLDERS = ("", "src", "src/handsteer", "src/handsteer/recognition", "src/handsteer/plugins/teach/synthetic", "ros")
 """Where a page means a file to be."""
 
-MADE_BY_READERS = re.compile(r"(?:anna/\d+|negatives/.*)\.jpg")
+MADE_BY_READERS = re.compile(r"(?:anna/\d+|negatives/.*)\.jpg|\.venv/ros2")
 
 
 def taken(command: str) -> tuple[list[str], dict[str, Any]]:
