@@ -8,6 +8,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from handsteer.config import CollisionMonitorConfig
+from handsteer.control import obstacles
 from handsteer.control.footprint import Points, gaps, on_a_circle, seen_from
 from handsteer.control.obstacles import ObstacleLimiter, limit
 from handsteer.types import ZERO, Velocity
@@ -56,9 +57,11 @@ def test_it_never_makes_faster_nor_turns_round(wanted: Velocity, points: Points,
 
 @given(velocities, surroundings)
 @example(Velocity(0.125, 2.0), around([(0.375, -2.0)]))  # the pad is met however it brakes: the latest is chosen
+@example(Velocity(-1.0, 1.0), around([(0.46875, 2.625)]))  # likewise; once it is slower, it can brake
 def test_what_it_lets_pass_it_lets_pass_again(wanted: Velocity, points: Points) -> None:
     said, _ = limit(wanted, points, RULE, moving=wanted)
     assume(limit(said, points, RULE, moving=wanted)[0] == said)
+    assume(obstacles._met_while_braking(wanted, said, points, RULE, None) is None)
     again, _ = limit(said, points, RULE, moving=said)
     assert again.linear_mps == pytest.approx(said.linear_mps, abs=0.006)
 
