@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.control.footprint import Points
+from handsteer.control.footprint import Points, on_a_circle
 from handsteer.control.moving import MotionOfPoints, drift
 from handsteer.control.obstacles import ObstacleLimiter
 from handsteer.types import ZERO, Velocity
@@ -118,3 +118,20 @@ def test_the_robot_stops_for_who_comes_before_it_would_for_who_stands() -> None:
         allowed[walk] = limiter.limit(wanted, 0.4).linear_mps
     assert allowed[0.0] == 1.0
     assert allowed[-1.4] < 0.5
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.03, 0.08])
+@pytest.mark.parametrize("robot", [Velocity(1.0, 0.0), Velocity(0.3, 1.2)], ids=["on", "curve"])
+def test_odometry_and_scans_that_come_late_make_nothing_move(robot: Velocity, late_s: float) -> None:
+    """Commands between them are for now: the way that they move the scans by is not counted again."""
+    limiter = ObstacleLimiter(CollisionMonitorConfig())
+    for tick in range(100):
+        now_s = tick * 0.01
+        measured_s = now_s - late_s
+        if tick % 2 == 0:
+            limiter.feel(robot, measured_s)
+        if tick % 10 == 0:
+            x, y, yaw = on_a_circle(robot, np.array([measured_s]))[0].tolist()
+            limiter.see(scan(x, y, yaw, [(2.5, 0.3), (1.8, -0.9)], seed=tick), measured_s)
+        limiter.limit(robot, now_s)
+        assert not np.any(limiter._drift), tick

@@ -52,6 +52,8 @@ _FEWEST_STEPS, _MOST_STEPS = 8, 400
 _ROUGHLY = 2.1
 _SLOWEST = 0.005
 _NOTHING_MPS = 1e-6
+# After so long without odometry or commands, and with another clock, earlier scans say nothing of what moves.
+_LOST_S = 1.0
 # Shares of linear and angular velocity to try if a velocity is too fast. Those that keep the turn come first, because
 # turning leads away from most obstacles.
 _LESS = ((1.0, 1.0), (0.75, 1.0), (0.5, 1.0), (0.25, 1.0), (0.0, 1.0), (1.0, 0.5), (1.0, 0.0), (0.5, 0.5), (0.0, 0.5))
@@ -302,6 +304,7 @@ class ObstacleLimiter:
         self._points: Points | None = None
         self._drift: Points | None = None
         self._motion = MotionOfPoints()
+        self._driven_s = -math.inf
         self._measured_s = -math.inf
         self._moving = self._commanded = ZERO
         self._moving_s = self._commanded_s = -math.inf
@@ -313,7 +316,10 @@ class ObstacleLimiter:
     def see(self, points: Points, measured_s: float) -> None:
         """Store a scan measured at ``measured_s``, in seconds of the caller's clock."""
         self._points, self._measured_s = points, measured_s
-        self._drift = self._motion.see(points, measured_s)
+        # Earlier scans are seen from where the robot is by now.
+        late_s, turning = max(0.0, self._driven_s - measured_s), Velocity(0.0, self._moving.angular_radps)
+        drift = self._motion.see(after(self._moving, late_s, points), measured_s)
+        self._drift = after(turning, -late_s, drift)
 
     def forget(self) -> None:
         """Forget the scan: nothing is known until the next one."""
@@ -326,9 +332,19 @@ class ObstacleLimiter:
         Without odometry, the robot is assumed to change its velocity at its guaranteed deceleration; most robots
         accelerate faster.
         """
-        if self._moving_s < measured_s < self._moving_s + 1.0:
-            self._motion.drive(self._moving, measured_s - self._moving_s)
+        self._drive(measured_s)
         self._moving, self._moving_s = moving, measured_s
+
+    def _drive(self, until_s: float) -> None:
+        """Move the earlier scans; a time that has been driven, as odometry comes late, is not driven again."""
+        seconds = until_s - self._driven_s
+        if abs(seconds) > _LOST_S:
+            self._motion.forget()
+        elif seconds > 0.0:
+            self._motion.drive(self._moving, seconds)
+        else:
+            return
+        self._driven_s = until_s
 
     def silence_s(self, now_s: float) -> float:
         """Return the age of the newest scan at ``now_s``; infinity if there is none."""
