@@ -53,7 +53,7 @@ def main() -> None:
 
 def _driving(jobs: int) -> int:
     """Write the tables and plots of all courses without assist; return the number of laps."""
-    usual = [Cell(course, of) for course in COURSES for of in INTERFACES if of != "signs_per_second"]
+    usual = [Cell(course, of) for course in COURSES for of in DRIVEN]
     usual.append(Cell("slalom", "signs_per_second"))
     varied = {
         factor: [Cell("slalom", of, with_factor(Conditions(), factor, value)) for of in interfaces for value in values]

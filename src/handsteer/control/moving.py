@@ -117,9 +117,7 @@ def _squares(points: Points, others: Points) -> Array:
 def _beyond(points: Points, before: Points) -> Array:
     """Return how much farther than each of ``points`` the earlier scan saw in its direction; both seen from there."""
     ranges = np.full(_BINS, np.inf)
-    bins = _bins(before)
-    order = np.argsort(-np.linalg.norm(before, axis=1))
-    ranges[bins[order]] = np.linalg.norm(before, axis=1)[order]
+    np.minimum.at(ranges, _bins(before), np.linalg.norm(before, axis=1))
     nearest = np.minimum(ranges, np.minimum(np.roll(ranges, 1), np.roll(ranges, -1)))
     return np.asarray(nearest[_bins(points)] - np.linalg.norm(points, axis=1))
 

@@ -139,6 +139,12 @@ class ByHand:
         self.delay_s = HAND_S
         self.hand = OperatorsHand(random, slips, CHOICES)
         self._view = view
+        self._moves = 0
+
+    @property
+    def changes(self) -> int:
+        """How often the sign, or the aim of the hand, has changed."""
+        return self.hand.changes + self._moves
 
     def hold_back(self, velocity: Velocity) -> None:
         """Continue from ``velocity``."""
@@ -161,11 +167,6 @@ class Signs(ByHand):
         self._choice = SignChoice(config.control, config.camera.fps, skill.reluctance)
         self._shown_s = 0.0
         self._calls = 0
-
-    @property
-    def changes(self) -> int:
-        """How often the sign has changed."""
-        return self.hand.changes
 
     def want(self, wanted: Velocity) -> None:
         """Choose a sign, ten times a second; a sign that has just been begun is shown first, unless it is to stop."""
@@ -204,14 +205,8 @@ class Joystick(ByHand):
         self._config = config.joystick
         self._least = 0.1 * skill.reluctance
         self._aim = (0.0, 0.0)
-        self._moves = 0
         self._since_s = self._shown_s = 0.0
         self._was_held = False
-
-    @property
-    def changes(self) -> int:
-        """How often the aim of the fist, or the sign, has changed."""
-        return self.hand.changes + self._moves
 
     def want(self, wanted: Velocity) -> None:
         """Move the fist, if it is held and the change is worth it; else hold it first."""
@@ -265,12 +260,6 @@ class Point(ByHand):
         self._before_mps = 0.0
         self._aim = self._trim_rad = 0.0
         self._since_s = self._shown_s = math.inf
-        self._moves = 0
-
-    @property
-    def changes(self) -> int:
-        """How often the sign, or the aim of the finger, has changed."""
-        return self.hand.changes + self._moves
 
     def want(self, wanted: Velocity) -> None:
         """Point along the arc, if the change is worth it."""
