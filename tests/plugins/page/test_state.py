@@ -271,6 +271,11 @@ def test_that_it_is_stopped_is_said_once() -> None:
     [
         (control(Reason("steered_at_zero"), source="steering"), NO_HAND, "steered directly"),
         (control(Reason("held"), source="joystick"), NO_HAND, "driven by the hand as a joystick"),
+        (
+            replace(control(NO_SIGN, source="joystick"), rule=ControlConfig(rule="point")),
+            RecognitionStatus("Forward", seen="Forward"),
+            "driven where the hand points",
+        ),
         (control(NO_SIGN), RecognitionStatus("Forward", seen="Forward"), "Forward"),
     ],
 )

@@ -125,7 +125,9 @@ def caught_up(reporting: Reporting, observed: Observed) -> Reporting:
         return reporting
     if control.linear_mps or control.angular_radps or command.is_zero or observed.command_came_s <= reported.came_s:
         return reporting
-    reason = {"steering": Reason("steered"), "joystick": Reason("joystick")}.get(control.source)
+    points = control.rule is not None and control.rule.points
+    by_hand = Reason("pointed" if points else "joystick")
+    reason = {"steering": Reason("steered"), "joystick": by_hand}.get(control.source)
     if control.source == "signs" and recognition is not None and recognition.sign not in (NONE, STOP):
         reason = Reason("sign", recognition.sign)
     if reason is None:
