@@ -1,4 +1,4 @@
-"""Limits of what clients can cost the page's server: connections, pages, and lines of the log.
+"""Connections to the page's server, by https too, and limits of what clients can cost: also pages, and log lines.
 
 So strangers cannot lock out the user who stops the robot. A connection is known once a request on it has shown a
 session (:mod:`handsteer.plugins.page.access`). Few unknown connections are kept open: a new one replaces the oldest
