@@ -14,7 +14,6 @@ from playwright.sync_api import Page
 from tests.plugins.page.browsers import a_browser
 from tests.plugins.page.test_server import read_jpeg
 from tests.plugins.page.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW, Visit, each_when_there_is_time, visiting
-from tests.plugins.page.webcams import a_person
 
 pytestmark = NEEDS_A_BROWSER
 
@@ -40,11 +39,10 @@ def done(page: Page) -> int:
     return page.locator(".coach li.done").count()
 
 
-def test_a_visitor_drives_by_signs_and_stops_in_few_clicks(slideshow: Path, tmp_path: Path) -> None:
-    clip = a_person(slideshow, tmp_path / "minute.mjpeg")
+def test_a_visitor_drives_by_signs_and_stops_in_few_clicks(person: Path) -> None:
     # A machine that draws the world in software, and has little time, is slow to send its camera's frames.
     patient: dict[str, Any] = {"signs": {"max_frame_age": 2.0, "dropout_hold": 1.0}, "control": {"sign_timeout": 2.0}}
-    with visiting("NONE:600", webcam=clip, **patient) as visit:
+    with visiting("NONE:600", webcam=person, **patient) as visit:
         page, robot = visit.page, visit.graph.robot
         page.evaluate(COUNT_CLICKS)
         visit.wait_until(lambda: intro(page) and visit.text(".camera .caption") == "demo hand")
@@ -71,9 +69,8 @@ PAUSE_PERMISSION = "navigator.permissions.query = async () => ({ state: 'prompt'
 
 
 @pytest.mark.parametrize("path", ["/world", *each_when_there_is_time("/", "/settings")])
-def test_ones_own_camera_stays_when_a_page_is_loaded(slideshow: Path, tmp_path: Path, path: str) -> None:
-    clip = a_person(slideshow, tmp_path / "minute.mjpeg")
-    with visiting("NONE:600", webcam=clip, camera={"fps": 5}) as visit:
+def test_ones_own_camera_stays_when_a_page_is_loaded(person: Path, path: str) -> None:
+    with visiting("NONE:600", webcam=person, camera={"fps": 5}) as visit:
         page, camera = visit.page, visit.graph.camera
 
         def gives() -> bool:
@@ -99,9 +96,8 @@ def test_ones_own_camera_stays_when_a_page_is_loaded(slideshow: Path, tmp_path: 
         assert visit.troubles == []
 
 
-def test_who_leaves_the_page_while_the_camera_opens_gives_it_on_the_next_one(slideshow: Path, tmp_path: Path) -> None:
-    clip = a_person(slideshow, tmp_path / "minute.mjpeg")
-    with visiting("NONE:600", webcam=clip, camera={"fps": 5}) as visit:
+def test_who_leaves_the_page_while_the_camera_opens_gives_it_on_the_next_one(person: Path) -> None:
+    with visiting("NONE:600", webcam=person, camera={"fps": 5}) as visit:
         page = visit.page
         page.context.grant_permissions(["camera"])
         page.evaluate(SLOW_CAMERA)
@@ -130,10 +126,9 @@ def raw_picture(url: str) -> float:
         return float(read_jpeg(response).mean())
 
 
-def test_others_see_a_drawn_hand_while_the_camera_is_for_me_only(slideshow: Path, tmp_path: Path) -> None:
-    clip = a_person(slideshow, tmp_path / "person.mjpeg")
+def test_others_see_a_drawn_hand_while_the_camera_is_for_me_only(person: Path) -> None:
     # Of two pages of one browser without a screen, only the newest plays a video.
-    with visiting("NONE:600", webcam=clip, camera={"fps": 5}) as visit, a_browser() as browser:
+    with visiting("NONE:600", webcam=person, camera={"fps": 5}) as visit, a_browser() as browser:
         page = visit.page
         only_me = page.get_by_role("button", name="Only me")
 

@@ -1,15 +1,15 @@
 """A learner's first minutes in a real browser with a fake camera: in two languages, on a large and a small screen."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import ViewportSize
+from playwright.sync_api import Page, ViewportSize
 
 from tests.plugins.page.test_accessibility import faults
 from tests.plugins.page.test_layout_in_browser import LAPTOPS, SHIFTS, TECHNICAL, fits
 from tests.plugins.page.visits import DESKTOP, IN_LANGUAGES_AND_SIZES, NEEDS_A_BROWSER, visiting
-from tests.plugins.page.webcams import a_person
 
 pytestmark = NEEDS_A_BROWSER
 
@@ -23,11 +23,8 @@ SIGNS = 6
 
 
 @pytest.mark.parametrize(("locale", "size"), IN_LANGUAGES_AND_SIZES)
-def test_a_learner_drives_by_ones_own_hand_within_two_clicks(
-    locale: str, size: ViewportSize, slideshow: Path, tmp_path: Path
-) -> None:
-    clip = a_person(slideshow, tmp_path / "person.mjpeg")
-    with visiting("NONE:600", webcam=clip, locale=locale, **PATIENT) as visit:
+def test_a_learner_drives_by_ones_own_hand_within_two_clicks(locale: str, size: ViewportSize, person: Path) -> None:
+    with visiting("NONE:600", webcam=person, locale=locale, **PATIENT) as visit:
         page, graph = visit.page, visit.graph
         page.set_viewport_size(size)
         page.add_init_script(f"({SHIFTS})(); {COUNT_CLICKS}")
@@ -46,6 +43,11 @@ def test_a_learner_drives_by_ones_own_hand_within_two_clicks(
         assert visit.troubles == []
 
 
+def all_tiles_in(page: Page, size: ViewportSize) -> bool:
+    boxes = [page.locator(".sign-tile").nth(number).bounding_box() for number in range(SIGNS)]
+    return all(box is not None and box["y"] + box["height"] <= size["height"] for box in boxes)
+
+
 @pytest.mark.parametrize("locale", USE)
 def test_the_first_screen_has_all_signs_and_nothing_technical(locale: str) -> None:
     with visiting("Forward:600", locale=locale, camera={"fps": 5}) as visit:
@@ -54,6 +56,5 @@ def test_the_first_screen_has_all_signs_and_nothing_technical(locale: str) -> No
         for size in (DESKTOP, LAPTOPS[0]):
             page.set_viewport_size(size)
             page.evaluate("scrollTo(0, 0)")
-            tiles = [page.locator(".sign-tile").nth(number).bounding_box() for number in range(SIGNS)]
-            assert all(box is not None and box["y"] + box["height"] <= size["height"] for box in tiles), size
+            visit.wait_until(partial(all_tiles_in, page, size))
             assert not any(page.locator(selector).first.is_visible() for selector in TECHNICAL), size

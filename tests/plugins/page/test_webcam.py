@@ -1,18 +1,14 @@
-"""The browser's own webcam, in a real browser that plays a real recording as one."""
+"""The browser's own webcam, in a real browser that plays photos of a real person as one."""
 
-import csv
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import cv2
 import pytest
 from playwright.sync_api import Browser, Page
 
-from handsteer.cameras import freshness
 from handsteer.config import load
 from handsteer.graph import Graph
-from handsteer.types import FORWARD, STOP
 from tests.plugins.page.browsers import a_browser
 from tests.plugins.page.served import page_process
 from tests.plugins.page.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
@@ -20,22 +16,8 @@ from tests.plugins.page.visits import NEEDS_A_BROWSER, PATIENCE_MS, WINDOW
 pytestmark = NEEDS_A_BROWSER
 
 
-def recording(slideshow: Path, signs: tuple[str, ...], path: Path) -> Path:
-    """Write the frames of the slide show with ``signs`` as a file that Chromium takes for a webcam."""
-    with slideshow.with_suffix(".labels.csv").open() as file:
-        wanted = {int(row["frame"]) for row in csv.DictReader(file) if row["sign"] in signs}
-    video = cv2.VideoCapture(str(slideshow))
-    with path.open("wb") as out:
-        for number in range(max(wanted) + 1):
-            image = video.read()[1]
-            if number in wanted:
-                out.write(cv2.imencode(".jpg", image)[1].tobytes())
-    return path
-
-
 @pytest.fixture
-def graph(monkeypatch: pytest.MonkeyPatch) -> Iterator[Graph]:
-    monkeypatch.setattr(freshness, "_PICTURES", 8)  # the webcam's clip is short, and repeats
+def graph() -> Iterator[Graph]:
     hand = {
         "camera": {"source": "virtual", "width": 320, "height": 240, "fps": 15},
         "virtual_hand": {"script": "NONE:60"},
@@ -59,9 +41,8 @@ def url(graph: Graph) -> Iterator[str]:
 
 
 @pytest.fixture
-def browser(slideshow: Path, tmp_path: Path) -> Iterator[Browser]:
-    webcam = recording(slideshow, (STOP, FORWARD), tmp_path / "forward.mjpeg")
-    with a_browser(webcam) as browser:
+def browser(person: Path) -> Iterator[Browser]:
+    with a_browser(person) as browser:
         yield browser
 
 
