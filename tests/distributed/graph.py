@@ -20,6 +20,7 @@ DIAGNOSTICS = "/diagnostics"
 SPEED_MPS = 0.3
 SUBNET = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
 STATIC_PEERS = {"ROS_STATIC_PEERS": f"{ROBOT};{WORKSTATION}"}
+_PATIENCE_S = 20.0
 WITH_CLOCK = Path(__file__).with_name("with_clock.py")
 # What the plain program looks at the robot's machine with: the same device as the nodes.
 _ONLOOKER = (
@@ -125,9 +126,10 @@ class TwoMachines:
             "robot": self.node(self.robot, "robot", "--world", "empty", ros=robot, ahead_s=ahead_s),
             "control": self.node(control_on or self.workstation, "control", ros=("-p", f"max_linear:={SPEED_MPS}")),
             "recognition": self.node(self.workstation, "recognition", ros=("-p", "image_transport:=compressed")),
-            "camera": self.camera(script, *camera, on=camera_on, ahead_s=ahead_s),
         }
-        return Drive(self, peer, nodes)
+        drive = Drive(self, peer, nodes, lambda script: self.camera(script, *camera, on=camera_on, ahead_s=ahead_s))
+        drive.show(script)
+        return drive
 
     def _log(self) -> Path:
         return self.home / f"process_{len(self._processes)}.log"
@@ -154,13 +156,15 @@ class Drive:
         machines: Where it runs.
         peer: Looks on.
         nodes: The processes by verb.
-        listener: Hears what nodes report; the same by default.
+        camera: Starts a camera that shows a script.
     """
 
     machines: TwoMachines
     peer: Peer
     nodes: dict[str, Process]
-    listener: Peer | None = None
+    camera: Callable[[str], Process]
+    _script: str = ""
+    _shown_s: float = 0.0
 
     def odometry(self, since_s: float = 0.0) -> list[Odometry]:
         """Return what the robot has said since a time."""
@@ -169,21 +173,36 @@ class Drive:
 
     def reports(self, node: str, since_s: float = 0.0) -> list[str]:
         """Return what a node has said on /diagnostics since ``time.monotonic()`` was ``since_s``."""
-        noted = (self.listener or self.peer).ask("get", topic=DIAGNOSTICS)
+        noted = self.peer.ask("get", topic=DIAGNOSTICS)
         return [message for at_s, (name, message) in noted if name.endswith(f": {node}") and at_s > since_s]
 
     def until_fast(self) -> None:
-        """Wait until the robot drives at its limit."""
-        self.until(lambda: self._last().speed_mps > SPEED_MPS - 0.01, "the robot to drive at its limit")
+        """Wait until the robot drives at its limit.
+
+        A machine that is held up for a moment stops it, and rightly so; then neutral is shown again.
+        """
+
+        def is_fast() -> bool:
+            if time.monotonic() - self._shown_s > _PATIENCE_S:
+                self.show(f"Stop:3 {self._script}")
+            return self._last().speed_mps > SPEED_MPS - 0.01
+
+        self.until(is_fast, "the robot to drive at its limit")
 
     def until_moving(self) -> None:
         """Wait until the robot drives at whatever speed."""
         self.until(lambda: self._last().speed_mps > 0.05, "the robot to drive")
 
-    def show_neutral(self, *, on: Machine | None = None) -> None:
-        """Show Stop for a while, then Forward, by a new camera on its machine; repeated, as it may not be seen yet."""
-        self.nodes.pop("camera").kill()
-        self.nodes["camera"] = self.machines.camera("Stop:3 Forward:12", on=on)
+    def show_neutral(self) -> None:
+        """Show Stop for a while, then Forward; repeated, as it may not be seen yet."""
+        self.show("Stop:3 Forward:12")
+
+    def show(self, script: str) -> None:
+        """Show what a script says, by a new camera."""
+        if "camera" in self.nodes:
+            self.nodes.pop("camera").kill()
+        self.nodes["camera"] = self.camera(script)
+        self._script, self._shown_s = script, time.monotonic()
 
     def until_standing(self) -> None:
         """Wait until the robot stands."""

@@ -60,7 +60,7 @@ AWAY = "ready: show Stop or lower your hand to begin (the robot's odometry has s
 def test_after_a_cut_the_robot_stands_until_neutral_was_seen_and_starts_from_nothing(machines: TwoMachines) -> None:
     machines.link.shape(**WIFI)
     drive = machines.start()
-    desk = Drive(machines, machines.onlooker(machines.workstation), {})
+    desk = Drive(machines, machines.onlooker(machines.workstation), {}, machines.camera)
     drive.until_fast()
     cut_s = machines.link.cut()
     drive.until_standing()
@@ -152,7 +152,7 @@ def test_commands_that_come_late_are_not_obeyed(machines: TwoMachines) -> None:
     drive.assert_standing(1.0)
     machines.link.shape(**WIFI)
     drive.assert_standing(1.0)
-    drive.show_neutral(on=machines.workstation)
+    drive.show_neutral()
     drive.until_fast()
 
 
