@@ -2,8 +2,8 @@
 
 from handsteer.clock import Clock
 from handsteer.config import RobotConfig
+from handsteer.plugins.sim.diff_drive import DriveState, integrate, step, wheel_speeds
 from handsteer.robots import Obstacle, RangeScan, RobotState
-from handsteer.robots.diff_drive import DriveState, integrate, step, wheel_speeds
 from handsteer.types import Pose2D, Velocity
 
 _DT_S = 0.02

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
+from handsteer.plugins.sim import diff_drive
+from handsteer.plugins.sim.diff_drive import DriveState
 from handsteer.plugins.sim.physics import ROBOT_JOINT, TIMESTEP_S, WHEEL_JOINTS, Lidar, compile_model, thing_name
 from handsteer.plugins.sim.walks import Walk, walks_in
-from handsteer.robots import Obstacle, RangeScan, RobotState, diff_drive
+from handsteer.robots import Obstacle, RangeScan, RobotState
 from handsteer.robots.description import robot_description
-from handsteer.robots.diff_drive import DriveState
 from handsteer.robots.world import World, load_world
 from handsteer.types import Pose2D, Velocity
 
@@ -82,7 +83,7 @@ class SimulatedRobot:
             raise WorldError(f"world {config.world}: {_at_start(touched[0])}")
 
     def command(self, linear_mps: float, angular_radps: float) -> None:
-        """Command a velocity in m/s and rad/s, processed by :func:`handsteer.robots.diff_drive.step`."""
+        """Command a velocity in m/s and rad/s, processed by :func:`handsteer.plugins.sim.diff_drive.step`."""
         self._command = Velocity(linear_mps, angular_radps)
 
     def step(self, dt_s: float) -> RobotState:

@@ -13,7 +13,6 @@ from handsteer.cameras.choose import open_camera
 from handsteer.cameras.files import read_photo
 from handsteer.cli.installation import fetch_missing
 from handsteer.cli.running import say, table
-from handsteer.cli.terminal import Keys, TerminalPicture
 from handsteer.clock import RealClock
 from handsteer.config import Config
 from handsteer.errors import ProfileError
@@ -23,6 +22,7 @@ from handsteer.plugins.teach.dataset import load_dataset
 from handsteer.plugins.teach.evaluation.intervals import Share
 from handsteer.plugins.teach.evaluation.labels import read_photo_labels
 from handsteer.plugins.teach.evaluation.views import View
+from handsteer.plugins.teach.terminal import Keys, TerminalPicture
 from handsteer.plugins.teach.verbs.calibrate import Timing
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.profile import profile_path, save_profile

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from handsteer.cameras.choose import open_camera
 from handsteer.cli.installation import fetch_missing
 from handsteer.cli.running import say
-from handsteer.cli.terminal import Keys, TerminalPicture
 from handsteer.clock import RealClock
 from handsteer.config import Config
 from handsteer.errors import DatasetError
 from handsteer.plugins.teach.collect import Collector, Facts, Status, collect_live, collect_moment, collect_recorded
 from handsteer.plugins.teach.dataset import Dataset, load_dataset, save_dataset
+from handsteer.plugins.teach.terminal import Keys, TerminalPicture
 from handsteer.plugins.teach.verbs.tables import dataset_table
 from handsteer.recognition.custom_signs import label_for
 from handsteer.recognition.hand import Hand

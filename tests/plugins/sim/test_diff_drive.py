@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
-from handsteer.robots.diff_drive import DriveState, integrate, step, velocity_of, wheel_speeds
+from handsteer.plugins.sim.diff_drive import DriveState, integrate, step, velocity_of, wheel_speeds
 from handsteer.types import Pose2D, Velocity
 
 CONFIG = RobotConfig()

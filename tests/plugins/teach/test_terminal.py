@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handsteer.cli.terminal import half_blocks
 from handsteer.plugins.teach.dataset import load_dataset
+from handsteer.plugins.teach.terminal import half_blocks
 
 
 def test_a_picture_is_lines_of_half_blocks_in_its_colours() -> None:
