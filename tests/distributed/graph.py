@@ -157,12 +157,14 @@ class Drive:
         peer: Looks on.
         nodes: The processes by verb.
         camera: Starts a camera that shows a script.
+        listener: Hears what nodes report; the peer by default.
     """
 
     machines: TwoMachines
     peer: Peer
     nodes: dict[str, Process]
     camera: Callable[[str], Process]
+    listener: Peer | None = None
     _script: str = ""
     _shown_s: float = 0.0
 
@@ -173,7 +175,7 @@ class Drive:
 
     def reports(self, node: str, since_s: float = 0.0) -> list[str]:
         """Return what a node has said on /diagnostics since ``time.monotonic()`` was ``since_s``."""
-        noted = self.peer.ask("get", topic=DIAGNOSTICS)
+        noted = (self.listener or self.peer).ask("get", topic=DIAGNOSTICS)
         return [message for at_s, (name, message) in noted if name.endswith(f": {node}") and at_s > since_s]
 
     def until_fast(self) -> None:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from tests.distributed.graph import SPEED_MPS, Drive, TwoMachines
@@ -110,20 +111,21 @@ def drive(layout: str) -> Iterator[Drive]:
                 "control": control,
                 "recognition": machines.node(workstation, "recognition", ros=("-p", "image_transport:=compressed")),
             }
-            yield Drive(machines, machines.onlooker(robot), nodes, peer)
+            camera_on = robot if "camera" in near else workstation
+            show = partial(machines.camera, on=camera_on)
+            yield Drive(machines, machines.onlooker(robot), nodes, show, peer)
         finally:
             machines.stop()
 
 
 def outcome_of(row: Row, drive: Drive) -> Outcome:
     """Drive, let it happen, let it end; whether it drives again, the next row shows."""
-    machines = drive.machines
-    near = "camera" in LAYOUTS[row.where]
-    drive.nodes["camera"] = machines.camera(SCRIPT, on=machines.robot if near else machines.workstation)
+    link = drive.machines.link
+    drive.show(SCRIPT)
     drive.until_fast()
-    began_s, heard_s = row.begin(machines.link), time.monotonic()
+    began_s, heard_s = row.begin(link), time.monotonic()
     time.sleep(row.lasts_s)
-    machines.link.shape()
+    link.shape()
     ended_s = time.time()
     time.sleep(AFTER_S)
     slower = [one.at_s for one in drive.odometry(began_s) if one.speed_mps < SPEED_MPS - 0.02]
