@@ -7,7 +7,7 @@ import pytest
 
 from handsteer.config import CollisionMonitorConfig
 from handsteer.control.footprint import Points, on_a_circle
-from handsteer.control.moving import MotionOfPoints, drift
+from handsteer.control.moving import PAUSE_S, ROOM_M, MotionOfPoints, drift
 from handsteer.control.obstacles import ObstacleLimiter
 from handsteer.types import ZERO, Velocity
 
@@ -118,6 +118,63 @@ def test_the_robot_stops_for_who_comes_before_it_would_for_who_stands() -> None:
         allowed[walk] = limiter.limit(wanted, 0.4).linear_mps
     assert allowed[0.0] == 1.0
     assert allowed[-1.4] < 0.5
+
+
+WALKS_S = 1.0
+
+
+def beside_who_stands(gap_m: float, stood_s: float, *, walks: bool = True) -> ObstacleLimiter:
+    """Return what a robot that stands knows of a person beside it, who walked there and has stood for ``stood_s``."""
+    limiter = ObstacleLimiter(CollisionMonitorConfig())
+    y = limiter.rule.side + gap_m + 0.25
+    for number in range(round((WALKS_S + stood_s) / PERIOD_S) + 1):
+        seconds = number * PERIOD_S
+        x = 0.15 + (0.6 * max(0.0, WALKS_S - seconds) if walks else 0.0)
+        limiter.feel(ZERO, seconds)
+        limiter.see(scan(0, 0, 0, [(x, y)], walls=False, seed=number), seconds)
+    limiter.limit(ZERO, WALKS_S + stood_s)
+    return limiter
+
+
+@pytest.mark.parametrize("side", [1, -1], ids=["ahead", "back"])
+def test_a_robot_stands_beside_who_stood_a_moment_ago_until_they_have_stood_for_longer(side: int) -> None:
+    """They let it pass, and may walk on into its side: seen only when that is too late."""
+    for stood_s, moves in ((0.5, False), (PAUSE_S - 0.5, False), (PAUSE_S + 1.0, True)):
+        limiter = beside_who_stands(0.1, stood_s)
+        allowed = limiter.limit(Velocity(0.3 * side, 0.0), WALKS_S + stood_s)
+        assert (allowed.linear_mps != 0.0) == moves, stood_s
+
+
+def test_who_has_not_walked_is_passed() -> None:
+    limiter = beside_who_stands(0.1, 0.5, walks=False)
+    assert limiter.limit(Velocity(0.3, 0.0), WALKS_S + 0.5).linear_mps == 0.3
+
+
+def test_who_stood_a_moment_ago_is_passed_with_room() -> None:
+    """So far to the side that nothing else would slow it."""
+    limiter = beside_who_stands(ROOM_M + 0.1, 0.5)
+    assert limiter.limit(Velocity(0.3, 0.0), WALKS_S + 0.5).linear_mps == 0.3
+
+
+def test_who_stood_a_moment_ago_counts_as_nearer_by_what_they_go_before_that_is_seen() -> None:
+    """In the last moment before they stand, they seem slower than they are."""
+
+    def nearest_m(walks: bool) -> float:
+        limiter = beside_who_stands(ROOM_M + 0.2, 0.5, walks=walks)
+        assert limiter._points is not None
+        return float(np.linalg.norm(limiter._points, axis=1).min())
+
+    assert 0.07 < nearest_m(walks=False) - nearest_m(walks=True) <= ROOM_M + 0.05
+
+
+def test_who_walked_is_forgotten_with_the_scans_and_no_more_than_a_few_are_remembered() -> None:
+    points = np.concatenate([(x, 0.0) + 0.05 * np.array([(0, -1), (0, 0), (0, 1)]) for x in range(1, 101)])
+    motion = MotionOfPoints()
+    motion._paused(points, np.ones_like(points), 0.0)
+    still = motion._paused(points, np.zeros_like(points), 0.1)
+    assert 0 < np.count_nonzero(still) <= 3 * 32
+    motion.forget()
+    assert not motion._paused(points, np.zeros_like(points), 0.2).any()
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.03, 0.08])

@@ -2,22 +2,35 @@
 
 import math
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.control.footprint import Array, Points, after
+from handsteer.config import CollisionMonitorConfig
+from handsteer.control.footprint import Array, Points, after, gaps
 from handsteer.types import Velocity
 
 BETWEEN_S = 0.25
 """Scans are compared with one that is so much older, in seconds, or a little more: in that time people go 0.3 m."""
 
+PAUSE_S = 3.0
+"""Who has walked, and stands for less than this, in seconds, may set out again at any moment."""
+
+ROOM_M = 0.25
+"""The most room, in metres, that the robot leaves to someone who may set out again."""
+
+_ROOM_S = 0.4  # a person who sets out is seen to walk after so long
 _MOST_S = 0.6
 _LEAST_S = 0.04  # between two that are remembered: at most 15 of them
 _APART_M, _WIDEST_M, _FEWEST = 0.2, 0.9, 3
 _SLOWEST_MPS, _FASTEST_MPS = 0.2, 2.0
 _ROUNDS = 4
+_MOST_WALKERS = 32
+# Between two scans nothing goes further than this.
+_SAME_M = 0.4
 # What is seen where nothing was seen before, by so much at least, has come there.
 _FREE_M, _FREE_SHARE = 0.08, 0.2
 _BINS = 360
@@ -30,21 +43,38 @@ class _Seen:
     origin: Points
 
 
+@dataclass(eq=False)
+class _Walker:
+    place: Points
+    speed_mps: float
+    walked_s: float
+
+
 class MotionOfPoints:
-    """Remembers scans, moved with the robot, and finds what of a new one moves."""
+    """Remembers scans, moved with the robot, and finds what of a new one moves.
+
+    Attributes:
+        paused_mps: Of each point of the newest scan, (N,), how fast it was before it stood, less than
+            :data:`PAUSE_S` ago; 0 for what moves, or has not moved.
+    """
 
     def __init__(self) -> None:
         self._seen: deque[_Seen] = deque()
+        self._walkers: list[_Walker] = []
+        self.paused_mps: Array = np.empty(0)
 
     def forget(self) -> None:
         """Forget all scans."""
         self._seen.clear()
+        self._walkers.clear()
 
     def drive(self, velocity: Velocity, seconds: float) -> None:
         """Take that the robot has moved at ``velocity`` for ``seconds``."""
         for each in self._seen:
             each.points = after(velocity, seconds, each.points)
             each.origin = after(velocity, seconds, each.origin)
+        for walker in self._walkers:
+            walker.place = after(velocity, seconds, walker.place)
 
     def see(self, points: Points, measured_s: float) -> Points:
         """Return the (N, 2) velocities of ``points``, x and y in m/s; zero for all that does not move, or is new."""
@@ -58,7 +88,48 @@ class MotionOfPoints:
             found = drift(points, before.points, before.origin, measured_s - before.measured_s)
         if not self._seen or measured_s - self._seen[-1].measured_s >= _LEAST_S:
             self._seen.append(_Seen(measured_s, points, np.zeros((1, 2))))
+        self.paused_mps = self._paused(points, found, measured_s)
         return found
+
+    def _paused(self, points: Points, velocities: Points, measured_s: float) -> Array:
+        """Remember who walks, and return the earlier speeds of who does not any more, (N,)."""
+        paused = np.zeros(len(points))
+        before = [walker for walker in self._walkers if 0.0 <= measured_s - walker.walked_s <= PAUSE_S]
+        now: list[_Walker] = []
+        for part in _things(points) if before or velocities.any() else ():
+            place = points[part].mean(axis=0, keepdims=True)
+            same = [walker for walker in before if np.linalg.norm(walker.place - place) <= _SAME_M]
+            speed_mps = float(np.linalg.norm(velocities[part][0]))
+            if speed_mps:
+                now.append(_Walker(place, speed_mps, measured_s))
+            elif same:
+                now.append(_Walker(place, same[0].speed_mps, same[0].walked_s))
+                paused[part] = same[0].speed_mps
+            before = [walker for walker in before if walker not in same]
+        self._walkers = [*now, *before][:_MOST_WALKERS]
+        return paused
+
+
+def with_room(points: Points, drift: Points, paused_mps: Array, rule: CollisionMonitorConfig) -> tuple[Points, Points]:
+    """Return ``points`` and ``drift`` as if all who stand for a moment were about to come to the robot.
+
+    People who let a robot pass walk on before it has passed, and are seen to walk only then. Until they have stood for
+    longer, they count as nearer by the way that they go in that time; a robot that is nearer stands, as if they came.
+
+    Args:
+        points: Of a scan, (N, 2).
+        drift: Velocities of the points, (N, 2) in m/s.
+        paused_mps: As of :class:`MotionOfPoints`.
+        rule: Size of the robot.
+    """
+    if not paused_mps.any():
+        return points, drift
+    far_m = np.maximum(np.linalg.norm(points, axis=1), 1e-9)
+    to_robot = -points / far_m[:, None]
+    room_m = np.minimum(_ROOM_S * paused_mps, ROOM_M)
+    is_near = gaps(points[:, 0], points[:, 1], rule) < room_m
+    nearer = points + np.where(is_near, 0.0, room_m)[:, None] * to_robot
+    return nearer, np.where((is_near & (paused_mps > 0.0))[:, None], paused_mps[:, None] * to_robot, drift)
 
 
 def drift(points: Points, before: Points, origin: Points, seconds: float) -> Points:
@@ -79,13 +150,9 @@ def drift(points: Points, before: Points, origin: Points, seconds: float) -> Poi
     was_free = _was_free(points, before, origin)
     if not was_free.any():
         return found
-    things = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1) > _APART_M)])
-    counts = np.bincount(things)
-    came = np.bincount(things, weights=was_free) >= np.maximum(_FREE_SHARE * counts, 1)
-    for number in np.flatnonzero(came & (counts >= _FEWEST)):
-        part = things == number
+    for part in _things(points):
         thing = points[part]
-        if np.ptp(thing, axis=0).max() > _WIDEST_M:
+        if was_free[part].sum() < max(_FREE_SHARE * len(thing), 1):
             continue
         near = before[np.linalg.norm(before - thing.mean(axis=0), axis=1) <= _WIDEST_M + _FASTEST_MPS * seconds]
         if len(near):
@@ -94,6 +161,14 @@ def drift(points: Points, before: Points, origin: Points, seconds: float) -> Poi
             if _SLOWEST_MPS <= speed <= _FASTEST_MPS:
                 found[part] = velocity
     return found
+
+
+def _things(points: Points) -> Iterator[slice]:
+    """Yield where in ``points``, (N, 2) in the order of their rays, things are that are not wider than 0.9 m."""
+    breaks = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) > _APART_M) + 1
+    for begin, end in pairwise([0, *breaks.tolist(), len(points)]):
+        if end - begin >= _FEWEST and np.ptp(points[begin:end], axis=0).max() <= _WIDEST_M:
+            yield slice(begin, end)
 
 
 def _was_free(points: Points, before: Points, origin: Points) -> NDArray[np.bool_]:

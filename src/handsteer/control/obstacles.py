@@ -27,7 +27,7 @@ from handsteer.control.footprint import (
     reach_m,
     seen_from,
 )
-from handsteer.control.moving import MotionOfPoints
+from handsteer.control.moving import MotionOfPoints, with_room
 from handsteer.doors import Assist
 from handsteer.types import ZERO, Velocity, changed_towards
 
@@ -315,11 +315,12 @@ class ObstacleLimiter:
 
     def see(self, points: Points, measured_s: float) -> None:
         """Store a scan measured at ``measured_s``, in seconds of the caller's clock."""
-        self._points, self._measured_s = points, measured_s
+        self._measured_s = measured_s
         # Earlier scans are seen from where the robot is by now.
         late_s, turning = max(0.0, self._driven_s - measured_s), Velocity(0.0, self._moving.angular_radps)
         drift = self._motion.see(after(self._moving, late_s, points), measured_s)
-        self._drift = after(turning, -late_s, drift)
+        drift = after(turning, -late_s, drift)
+        self._points, self._drift = with_room(points, drift, self._motion.paused_mps, self.rule)
 
     def forget(self) -> None:
         """Forget the scan: nothing is known until the next one."""

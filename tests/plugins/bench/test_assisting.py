@@ -69,3 +69,9 @@ def test_nobody_who_walks_is_touched_by_a_robot_that_moves() -> None:
     assert (brake.bumps, steer.bumps) == (0, 0)
     assert brake.finished
     assert steer.finished
+
+
+@pytest.mark.slow
+def test_who_has_stood_for_the_robot_is_not_touched_when_they_walk_on() -> None:
+    """Signs are slow enough for that; on this lap a person sets out when the robot is beside them."""
+    assert run_lap("corridor", "signs", 3, Conditions(assist="steer")).bumps == 0
