@@ -154,6 +154,30 @@ def test_what_cannot_be_read_and_what_is_said_at_the_end(joined: Join, domain: i
     context.shutdown()
 
 
+class Idle:
+    """A managed node that does nothing."""
+
+    is_active = True
+
+    def set_active(self, is_active: bool) -> bool:
+        self.is_active = is_active
+        return True
+
+
+def test_a_managed_node_leaves_the_graph_when_its_session_is_closed(joined: Join, domain: int) -> None:
+    """Its process may go on, and not each middleware takes the end of a process for a departure."""
+    context = rclpy.Context()
+    context.init(args=[], domain_id=domain)
+    node = rclpy.create_node("other", context=context)
+    session = joined()
+    session.manage(Idle())
+    assert eventually(lambda: session.name.strip("/") in node.get_node_names())
+    session.close()
+    assert eventually(lambda: session.name.strip("/") not in node.get_node_names())
+    node.destroy_node()
+    context.shutdown()
+
+
 def test_auto_takes_rclpy_where_it_is() -> None:
     session = join("auto", "tests", ())
     assert type(session).__name__ == "RclpySession"

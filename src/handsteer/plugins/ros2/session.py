@@ -215,6 +215,12 @@ class LateManagedNode(LifecycleNodeMixin, Node):  # type: ignore[misc]
         LifecycleNodeMixin.__init__(self)
         self._wake_executor()
 
+    def destroy_node(self) -> None:
+        """Destroy the node, of which its state machine, which rclpy keeps, would hold a part in the graph."""
+        super().destroy_node()
+        if self._managed is not None:
+            self._state_machine.destroy_when_not_in_use()
+
     def on_activate(self, state: Any) -> Any:
         """Activate the node."""
         return self._set_active(True)
