@@ -1139,5 +1139,5 @@ def test_a_stop_while_it_is_deactivated_is_remembered() -> None:
 
 def test_whether_the_hand_drives_can_be_asked() -> None:
     bench = ControlBench(engage=True)
-    assert bench.control.services()["engage_state"]().startswith("disengaged: ")
+    assert bench.control.services()["engage_state"]() == "disengaged: open, close and open your hand to begin"
     assert ControlBench().control.services()["engage_state"]() == "engaged"

@@ -173,7 +173,7 @@ class HandSignControlNode(Node):
 
     def _engage_state(self) -> str:
         engagement = self._safety.engagement
-        return "engaged" if engagement.engaged else f"disengaged: {engagement.reason}"
+        return "engaged" if engagement.engaged else str(engagement.reason)
 
     def on_activate(self) -> None:
         """Wait for neutral, and for the gesture that engages: what was shown before does not count."""
