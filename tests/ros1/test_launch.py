@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import signal
+import subprocess
 import sys
 import time
 from itertools import groupby, pairwise
@@ -18,7 +19,7 @@ import pytest
 
 from tests.docs import pages
 from tests.processes import eventually, free_port
-from tests.ros1.launches import ROOT, LaunchGraph, Recorder, run
+from tests.ros1.launches import ROOT, Launch, LaunchGraph, Recorder, ros_environment, run
 
 pytestmark = [pytest.mark.ros1, pytest.mark.slow]
 
@@ -336,6 +337,24 @@ def test_sliders_are_served_where_the_args_say(ros: LaunchGraph) -> None:
             return False
 
     eventually(served, what="the page is served")
+
+
+def test_both_files_start_in_the_same_moment_if_one_waits_for_the_others_master(tmp_path: Path) -> None:
+    """Otherwise each starts a master of its own, and one of them ends: roslaunch has no election."""
+    env = ros_environment(ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}", ROS_HOME=str(tmp_path))
+    files = (("roslaunch", *SIGN_CONTROL, VIRTUAL), ("roslaunch", "--wait", *DRIVE_ROBOT))
+    launches = [Launch([*words], env, tmp_path / f"{number}.log") for number, words in enumerate(files)]
+
+    def nodes() -> set[str]:
+        listed = subprocess.run(["rosnode", "list"], env=env, capture_output=True, text=True, check=False)
+        return set(listed.stdout.split())
+
+    try:
+        eventually(lambda: {*CHAIN} <= nodes(), 90.0, "the nodes of both files")
+        assert all(launch.running for launch in launches)
+    finally:
+        for launch in reversed(launches):
+            launch.kill()
 
 
 def test_a_camera_that_is_not_there_is_named_with_what_works_without(ros: LaunchGraph) -> None:
