@@ -2,9 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,10 +94,11 @@ class MotionOfPoints:
         paused = np.zeros(len(points))
         before = [walker for walker in self._walkers if 0.0 <= measured_s - walker.walked_s <= PAUSE_S]
         now: list[_Walker] = []
-        for part in _things(points) if before or velocities.any() else ():
+        parts = _things(points) if before or velocities.any() else []
+        for part in parts:
             place = points[part].mean(axis=0, keepdims=True)
-            same = [walker for walker in before if np.linalg.norm(walker.place - place) <= _SAME_M]
-            speed_mps = float(np.linalg.norm(velocities[part][0]))
+            same = [walker for walker in before if math.dist(walker.place[0], place[0]) <= _SAME_M]
+            speed_mps = math.hypot(*velocities[part.start])
             if speed_mps:
                 now.append(_Walker(place, speed_mps, measured_s))
             elif same:
@@ -150,10 +149,8 @@ def drift(points: Points, before: Points, origin: Points, seconds: float) -> Poi
     was_free = _was_free(points, before, origin)
     if not was_free.any():
         return found
-    for part in _things(points):
+    for part in _things(points, was_free):
         thing = points[part]
-        if was_free[part].sum() < max(_FREE_SHARE * len(thing), 1):
-            continue
         near = before[np.linalg.norm(before - thing.mean(axis=0), axis=1) <= _WIDEST_M + _FASTEST_MPS * seconds]
         if len(near):
             velocity = -_moved_onto(thing, near) / seconds
@@ -163,12 +160,20 @@ def drift(points: Points, before: Points, origin: Points, seconds: float) -> Poi
     return found
 
 
-def _things(points: Points) -> Iterator[slice]:
-    """Yield where in ``points``, (N, 2) in the order of their rays, things are that are not wider than 0.9 m."""
-    breaks = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) > _APART_M) + 1
-    for begin, end in pairwise([0, *breaks.tolist(), len(points)]):
-        if end - begin >= _FEWEST and np.ptp(points[begin:end], axis=0).max() <= _WIDEST_M:
-            yield slice(begin, end)
+def _things(points: Points, which: NDArray[np.bool_] | None = None) -> list[slice]:
+    """Return where in ``points``, (N, 2) in the order of their rays, things are that are not wider than 0.9 m.
+
+    With ``which``, (N,), only those of which it holds for a fifth of the points.
+    """
+    if not len(points):
+        return []
+    begins = np.concatenate([[0], np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) > _APART_M) + 1])
+    counts = np.diff([*begins, len(points)])
+    sizes = np.maximum.reduceat(points, begins) - np.minimum.reduceat(points, begins)
+    found = (counts >= _FEWEST) & (sizes.max(axis=1) <= _WIDEST_M)
+    if which is not None:
+        found &= np.add.reduceat(which, begins, dtype=int) >= np.maximum(_FREE_SHARE * counts, 1)
+    return [slice(begins[number], begins[number] + counts[number]) for number in np.flatnonzero(found)]
 
 
 def _was_free(points: Points, before: Points, origin: Points) -> NDArray[np.bool_]:
