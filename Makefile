@@ -16,9 +16,8 @@ unexport PYTHONDONTWRITEBYTECODE
 # The matrices are small and tests run in parallel, so NumPy's threads would only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 
-# A test that drives a robot has to keep up with its camera: one more than processors only where these run the landmark
-# models three times as fast.
-WORKERS ?= $(shell grep -qsE 'avx(512)?_vnni' /proc/cpuinfo; echo $$(($$(getconf _NPROCESSORS_ONLN) + 1 - $$?)))
+# No more than processors: a test that drives a robot has to keep up with its camera, and with one more they took as long.
+WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
 # The tests come in an order of their own, the longest first.
 PARALLEL = -n $(WORKERS) --dist loadgroup --no-loadscope-reorder
 PLAIN := not (ros1 or ros2 or netns or exhaustive or arm)
