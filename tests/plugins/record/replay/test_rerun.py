@@ -1,4 +1,5 @@
 from collections import Counter
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import pytest
@@ -7,8 +8,10 @@ from handsteer.config import Config, VirtualHandConfig
 from handsteer.errors import RecordingError
 from handsteer.graph import Graph
 from handsteer.messages import HAND_SIGN
+from handsteer.nodes.journal import journal_topic
 from handsteer.plugins.record.mcap_reader import McapFile
 from handsteer.plugins.record.mcap_writer import McapWriter
+from handsteer.plugins.record.recorded import Recorded
 from handsteer.plugins.record.replay.compare import Comparison, Moment, compare
 from handsteer.plugins.record.replay.rerun import Source, recorded_config, rerun
 
@@ -109,3 +112,44 @@ def test_a_recording_that_was_cut_off_is_replayed_up_to_there(recording: Path, t
     assert list(compare(rerun(file, recorded_config(file)), comparison, file.began_s)) == []
     assert comparison.frames > 100
     assert file.problem is not None
+
+
+class CutInASpin(McapFile):
+    """A recording that ends while recognition publishes a sign: the control has it, recognition's journal not yet."""
+
+    cut_topic = journal_topic("hand_sign_recognition").name
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[Recorded]:
+        """Yield the messages up to the control's last entry with a sign."""
+        written = list(super().messages())
+        self.problem = "it was cut off"
+        end = max(
+            index for index, each in enumerate(written) if self._is_of_control(each) and HAND_SIGN.name in text(each)
+        )
+        entry = max(index for index, each in enumerate(written[:end]) if each.topic == self.cut_topic)
+        kept = [*written[:entry], *written[entry + 1 : end + 1]]
+        return iter([each for each in kept if topics is None or each.topic in topics])
+
+    @staticmethod
+    def _is_of_control(recorded: Recorded) -> bool:
+        return recorded.topic == journal_topic("hand_sign_control").name
+
+
+def text(recorded: Recorded) -> str:
+    return str(recorded.message.data)
+
+
+class CutBeforeTheSign(CutInASpin):
+    """Likewise, but the sign itself is not recorded either."""
+
+    cut_topic = HAND_SIGN.name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "source"), [(CutInASpin, "frames"), (CutBeforeTheSign, "signs")])
+def test_a_recording_that_ends_in_a_spin_is_replayed_up_to_there(
+    kind: type[CutInASpin], source: Source, recording: Path
+) -> None:
+    file, comparison = kind(recording), Comparison()
+    assert list(compare(rerun(file, recorded_config(file), source), comparison, file.began_s)) == []
+    assert comparison.commands > 200

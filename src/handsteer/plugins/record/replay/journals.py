@@ -88,7 +88,7 @@ def read_spins(file: Recording, node: str) -> Iterator[Spin]:
                 of_topic.popitem(last=False)
         while waiting and (len(waiting) > _MOST_READ_AHEAD or _is_complete(waiting[0], seen)):
             yield _filled(waiting.popleft(), seen)
-    while waiting:
+    while waiting and (file.problem is None or _is_complete(waiting[0], seen)):  # else it was cut off there
         yield _filled(waiting.popleft(), seen)
 
 

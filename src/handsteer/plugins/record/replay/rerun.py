@@ -98,6 +98,10 @@ class _Outputs:
             self._recorded.setdefault(topic, []).extend((self._spins, position) for position in range(count))
         self._spins += 1
 
+    def lacks(self, topic: str, number: int) -> bool:
+        """Return whether the recorded message of this number is later than all that recognition has published."""
+        return number - self._first.get(topic, 1) >= len(self._recorded.get(topic, []))
+
     def end_of(self, topic: str, number: int) -> int:
         """Return how many messages of the replay go until the recorded one of this number, that included."""
         recorded, begins = self._recorded.get(topic, []), self._begins.get(topic, [])
@@ -187,6 +191,8 @@ def _rerun(
     transport.take()
     feed = _Feed(outputs) if outputs is not None else None
     for spin in spins:
+        if feed is not None and feed.lacks(spin):
+            return  # it was cut off in the spin of recognition that published what the control has got here
         clock.set(spin.readings)
         transport.answers.update(spin.saw)
         if spin.is_stop:
@@ -238,6 +244,10 @@ class _Feed:
     def __init__(self, outputs: _Outputs) -> None:
         self._outputs = outputs
         self._passed = dict.fromkeys(_OUTPUTS[RECOGNITION], 0)
+
+    def lacks(self, spin: Spin) -> bool:
+        """Return whether recognition has not published what was processed in ``spin``."""
+        return any(got.topic in self._passed and self._outputs.lacks(got.topic, got.number) for got in spin.got)
 
     def received(self, spin: Spin) -> Iterator[tuple[str, Received[Any]]]:
         yield from _received([got for got in spin.got if got.topic not in self._passed])
