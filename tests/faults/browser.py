@@ -19,11 +19,13 @@ from handsteer.config import load
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, DIAGNOSTICS, HAND_SIGN, DiagnosticArray, String, Twist
 from handsteer.plugins.page.page_process import PageProcess
+from handsteer.plugins.study.session import Task
+from handsteer.robots.world import Gate, World
 from handsteer.timeouts import ROBOT_S
 from handsteer.transports.base import Received
 from tests.faults.stepped import Outcome
 from tests.plugins.page.browsers import TILTS_UNASKED, a_browser
-from tests.plugins.study.plans import a_task
+from tests.plugins.study.plans import a_plan, a_task
 
 FAULT_S, AFTER_S = 2.0, 1.5
 HELD_S, TRIES_S, PATIENCE_S = 0.3, 4.0, 90.0
@@ -54,10 +56,12 @@ class Rig:
         page: The driver's.
         debugger: Of that page.
         by: ``key`` or ``tilt``.
+        studies: Whether the driver is led through a study, and drives in a lap of it.
     """
 
-    def __init__(self, graph: Graph, process: PageProcess, browser: Browser, url: str, by: str) -> None:
-        self.graph, self.process, self.browser, self.url, self.by = graph, process, browser, url, by
+    def __init__(self, graph: Graph, process: PageProcess, browser: Browser, url: str, row: "Row") -> None:
+        self.graph, self.process, self.browser, self.url = graph, process, browser, url
+        self.by, self.studies = row.by, row.studies
         self.said = ""
         self._commands: list[tuple[float, float]] = []
         graph.transport.subscribe("onlooker", CMD_VEL, self._on_command)
@@ -72,6 +76,10 @@ class Rig:
         self.page.set_default_timeout(1000 * PATIENCE_S)
         self.page.goto(self.url)
         self.page.locator(".banner").wait_for()
+        if self.studies:
+            for name in ("I agree", "Continue", "Begin lap"):
+                self.page.get_by_role("button", name=name).click()
+            self.page.locator(".study", has_text="Drive through the yellow gate").wait_for()
         self.debugger: CDPSession = context.new_cdp_session(self.page)
         self.debugger.send("Debugger.enable")
 
@@ -261,6 +269,15 @@ def _with(status: Any, text: str) -> Any:
     return replace(status, message=text, hardware_id="another", values=values)
 
 
+def a_long_lap(folder: Path) -> Task:
+    """Return the task of a study with one lap, driven by keys, to a finish that is far away."""
+    plan = a_plan(
+        participants=1, conditions=[{"name": "keys", "input": "keys"}], forms=[], practice_laps=0, laps=1, lap_limit=600
+    )
+    gates = tuple(Gate(name=f"{x}", left=(x, 1.0), right=(x, -1.0)) for x in (0.1, 40.0))
+    return replace(a_task(folder, plan), courses=dict.fromkeys(plan.courses, World(gates=gates)))
+
+
 @contextmanager
 def rig(row: Row) -> Iterator[Rig]:
     """Let a graph and its page run for as long as the block lasts."""
@@ -272,9 +289,9 @@ def rig(row: Row) -> Iterator[Rig]:
     with tempfile.TemporaryDirectory() as home, Graph(load(base=base), steering=False) as graph, a_browser() as browser:
         process = PageProcess()
         try:
-            url = process.serve(graph, study=a_task(Path(home)) if row.studies else None).removesuffix("/study")
+            url = process.serve(graph, study=a_long_lap(Path(home)) if row.studies else None).removesuffix("/study")
             graph.start()
-            yield Rig(graph, process, browser, url, row.by)
+            yield Rig(graph, process, browser, url, row)
         finally:
             process.stop()
 
