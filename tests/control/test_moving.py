@@ -136,12 +136,12 @@ def beside_who_stands(gap_m: float, stood_s: float, *, walks: bool = True) -> Ob
     return limiter
 
 
-@pytest.mark.parametrize("side", [1, -1], ids=["ahead", "back"])
-def test_a_robot_stands_beside_who_stood_a_moment_ago_until_they_have_stood_for_longer(side: int) -> None:
+@pytest.mark.parametrize("way", [1, -1], ids=["ahead", "back"])
+def test_a_robot_stands_beside_who_stood_a_moment_ago_until_they_have_stood_for_longer(way: int) -> None:
     """They let it pass, and may walk on into its side: seen only when that is too late."""
     for stood_s, moves in ((0.5, False), (PAUSE_S - 0.5, False), (PAUSE_S + 1.0, True)):
         limiter = beside_who_stands(0.1, stood_s)
-        allowed = limiter.limit(Velocity(0.3 * side, 0.0), WALKS_S + stood_s)
+        allowed = limiter.limit(Velocity(0.3 * way, 0.0), WALKS_S + stood_s)
         assert (allowed.linear_mps != 0.0) == moves, stood_s
 
 

@@ -94,8 +94,7 @@ class MotionOfPoints:
         paused = np.zeros(len(points))
         before = [walker for walker in self._walkers if 0.0 <= measured_s - walker.walked_s <= PAUSE_S]
         now: list[_Walker] = []
-        parts = _things(points) if before or velocities.any() else []
-        for part in parts:
+        for part in _things(points) if before or velocities.any() else []:
             place = points[part].mean(axis=0, keepdims=True)
             same = [walker for walker in before if math.dist(walker.place[0], place[0]) <= _SAME_M]
             speed_mps = math.hypot(*velocities[part.start])
@@ -126,9 +125,9 @@ def with_room(points: Points, drift: Points, paused_mps: Array, rule: CollisionM
     far_m = np.maximum(np.linalg.norm(points, axis=1), 1e-9)
     to_robot = -points / far_m[:, None]
     room_m = np.minimum(_ROOM_S * paused_mps, ROOM_M)
-    is_near = gaps(points[:, 0], points[:, 1], rule) < room_m
+    is_near = (paused_mps > 0.0) & (gaps(points[:, 0], points[:, 1], rule) < room_m)
     nearer = points + np.where(is_near, 0.0, room_m)[:, None] * to_robot
-    return nearer, np.where((is_near & (paused_mps > 0.0))[:, None], paused_mps[:, None] * to_robot, drift)
+    return nearer, np.where(is_near[:, None], paused_mps[:, None] * to_robot, drift)
 
 
 def drift(points: Points, before: Points, origin: Points, seconds: float) -> Points:
