@@ -1,4 +1,4 @@
-"""The shipped 8-bit model against the one that it is made of."""
+"""The shipped models: the 8-bit one against the one that it is made of, and the palm model on grey pictures."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,20 +8,28 @@ import pytest
 
 from handsteer.config import LandmarksConfig
 from handsteer.errors import ModelCorrupt, ModelMissing
+from handsteer.plugins.teach.evaluation.views import View
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.landmark_models import SHIPPED, find_model
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from tests.recognition.drawn_hand import draw, open_left_hand, open_right_hand
 from tests.recognition.golden_frames import DATA, photo_paths, read_photo, read_video
 
-(NAME,) = SHIPPED
+NAMES = sorted(SHIPPED)
 HAND_PX = 112
 """What a hand takes of the 224 pixels that the model sees, about."""
 
 
 @pytest.fixture(scope="module")
 def landmarkers() -> list[MediaPipeLandmarker]:
-    return [MediaPipeLandmarker(LandmarksConfig(model=model)) for model in ("full", "fast")]
+    """Return one with each landmark model, both with the same palm model."""
+
+    def pair(model: str) -> tuple[Path, Path]:
+        return find_model("palm_detection_full.tflite"), find_model(f"hand_landmark_{model}.tflite")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("handsteer.recognition.landmarker.find_pair", pair)
+        return [MediaPipeLandmarker(LandmarksConfig(model=model)) for model in ("full", "fast")]
 
 
 def hands_of_both(landmarkers: list[MediaPipeLandmarker], image: np.ndarray) -> list[tuple[Hand, Hand]]:
@@ -79,19 +87,44 @@ def test_people_are_seen_as_by_the_full_model(landmarkers: list[MediaPipeLandmar
     assert np.mean([full.handedness == fast.handedness for full, fast in pairs]) > 0.97
 
 
-def test_it_is_part_of_handsteer_and_needs_no_fetching(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_part_of_handsteer_and_needs_no_fetching(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("HANDSTEER_MODELS", str(tmp_path))
-    assert find_model(NAME).is_file()
+    assert find_model(name).is_file()
 
 
-def test_a_damaged_copy_is_refused(tmp_path: Path) -> None:
-    content = bytearray(find_model(NAME).read_bytes())
+@pytest.mark.parametrize("name", NAMES)
+def test_a_damaged_copy_is_refused(name: str, tmp_path: Path) -> None:
+    content = bytearray(find_model(name).read_bytes())
     content[len(content) // 2] ^= 1
-    (tmp_path / NAME).write_bytes(content)
-    with pytest.raises(ModelCorrupt, match=rf"{NAME} is damaged: install handsteer again"):
-        find_model(NAME, tmp_path)
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ModelCorrupt, match=rf"{name} is damaged: install handsteer again"):
+        find_model(name, tmp_path)
 
 
-def test_a_missing_one_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ModelMissing, match=rf"{NAME} .*install handsteer again"):
-        find_model(NAME, tmp_path)
+@pytest.mark.parametrize("name", NAMES)
+def test_a_missing_one_is_named(name: str, tmp_path: Path) -> None:
+    with pytest.raises(ModelMissing, match=rf"{name} .*install handsteer again"):
+        find_model(name, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sign", ["turn_left", "turn_right"])
+def test_grey_hands_of_people_some_metres_away_are_found_nearly_as_often_as_coloured_ones(
+    data_dir: Path, sign: str
+) -> None:
+    paths = sorted((data_dir / "photos" / sign).glob("emre*"))
+    assert len(paths) > 60
+
+    def found(grey: bool, model: str) -> int:
+        landmarker, hands = MediaPipeLandmarker(LandmarksConfig(model=model)), 0
+        for path in paths:
+            landmarker.reset()
+            hands += bool(landmarker.detect(View(grey=grey).picture(read_photo(str(path)))))
+        return hands
+
+    coloured, grey = (found(grey, "fast") for grey in (False, True))
+    assert grey >= 0.95 * coloured
+    assert found(True, "full") < grey  # MediaPipe's own palm model

@@ -42,8 +42,8 @@ def test_a_palm_is_recognised_without_colours_and_in_a_sensors_pattern(encoding:
 
 
 @pytest.mark.parametrize("sign", ["Stop", "Forward", "Turn Left", "Go"])
-def test_a_small_grey_hand_is_recognised_as_the_palm_model_sees_it_in_a_colour_like_skin(sign: str) -> None:
-    """Without that it is found in none of these pictures: the palm model was trained on colours."""
+def test_a_small_grey_hand_is_recognised(sign: str) -> None:
+    """MediaPipe's palm model, which was trained on colours, finds it in none of these pictures."""
     clock, recognizer, found = SteppedClock(0.0), Recognizer(), []
     camera = VirtualHandCamera(VirtualHandConfig(script=f"{sign}:9"), width=640, height=480, fps=10.0, clock=clock)
     for second in range(4):

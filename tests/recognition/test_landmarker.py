@@ -449,7 +449,7 @@ def test_noise_of_any_size_gives_sound_hands_or_none(
 def test_models_that_are_not_there_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HANDSTEER_MODELS", str(tmp_path))
     with pytest.raises(ModelMissing, match=r"palm_detection_full\.tflite.*handsteer models"):
-        MediaPipeLandmarker(LandmarksConfig())
+        MediaPipeLandmarker(LandmarksConfig(model="full"))
 
 
 @pytest.mark.slow
@@ -458,7 +458,7 @@ def test_hands_that_nearly_fill_the_frame_are_found_in_a_widened_one(data_dir: P
     assert len(photos) == 68
 
     def found(**config: bool) -> int:
-        landmarker = MediaPipeLandmarker(LandmarksConfig(**config))
+        landmarker = MediaPipeLandmarker(LandmarksConfig(model="full", **config))
         hands = []
         for photo in photos:
             landmarker.reset()

@@ -37,7 +37,7 @@ def test_signs_of_strangers_are_told_and_nothing_else_moves_the_robot(data_dir: 
 
 
 def test_a_grey_camera_shows_most_signs_of_strangers_too(data_dir: Path, recognizer: Recognizer) -> None:
-    """Without colours, the palm model by itself misses 4 of 10 turns in these photos."""
+    """Without colours, MediaPipe's palm model misses 4 of 10 turns in these photos."""
     right, shown = 0, 0
     with (data_dir / "photos" / "index.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["sign"] not in ("", NONE) and int(row["width"]) >= 400]
@@ -47,7 +47,7 @@ def test_a_grey_camera_shows_most_signs_of_strangers_too(data_dir: Path, recogni
         shown += 1
         right += recognizer.recognize(np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), np.uint8)).seen == row["sign"]
     assert shown > 50
-    assert right >= 0.8 * shown
+    assert right >= 0.9 * shown
 
 
 def test_a_hand_that_opens_pinches_and_closes_never_moves_the_robot(data_dir: Path, recognizer: Recognizer) -> None:

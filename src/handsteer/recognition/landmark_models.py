@@ -2,7 +2,7 @@
 
 They are MediaPipe's (Apache-2.0). No package of their own exists, so they are extracted, with their licence, from the
 ``mediapipe`` wheel on PyPI; MediaPipe itself is not installed. ``pip`` downloads the wheel, because it knows the user's
-package index, proxies and certificates. A small model derived from one of them is part of handsteer.
+package index, proxies and certificates. Two models derived from them are part of handsteer.
 """
 
 import hashlib
@@ -41,8 +41,9 @@ MODELS: Final = {
 
 SHIPPED: Final = {
     "hand_landmark_fast.tflite": "383471f879c29961bb5c2b53a3cb4fc5cf84abe41751c612700b288ed815e1bd",
+    "palm_detection_fast.tflite": "22a88a490d15d26a60dfea09307ebbeab4c37d5fe3ff9c9d4e305a7fcd02145c",
 }
-"""SHA-256 of each model file that is part of handsteer, as built by ``make landmark-model``."""
+"""SHA-256 of each model file that is part of handsteer, as made by ``scripts/landmark_model`` and ``palm_model``."""
 
 Progress = Callable[[int, int], None]
 """Called repeatedly with the number of downloaded bytes and of all bytes."""
@@ -104,8 +105,7 @@ def find_pair(model: str) -> tuple[Path, Path]:
         ModelMissing: One does not exist, or cannot be read.
         ModelCorrupt: The content of one is unexpected.
     """
-    palm = "full" if model == "fast" else model  # the palm model gains little from 8-bit integers
-    return find_model(f"palm_detection_{palm}.tflite"), find_model(f"hand_landmark_{model}.tflite")
+    return find_model(f"palm_detection_{model}.tflite"), find_model(f"hand_landmark_{model}.tflite")
 
 
 def fetch_models(progress: Progress) -> list[Path]:

@@ -57,6 +57,8 @@ _SEARCH_BESIDE_A_HAND: Final = Pace(change=6, settle_s=0.6, period_s=1.0, least_
 """Likewise with a hand in view: after a change, both ways have their frame."""
 _FOLLOW: Final = Pace(change=3, settle_s=0.08, period_s=0.1)
 """How often to process tracked hands: below three levels, landmarks deviate by at most 0.03 of the hand."""
+_SAME_TURN_OVERLAP: Final = 0.3
+"""Regions that overlap more than this share a turn: one way to search gives a face a region 1.5 times another's."""
 _MAX_SIDE: Final = 32766
 """Maximum side of a picture that OpenCV can sample, in pixels."""
 
@@ -236,7 +238,7 @@ class MediaPipeLandmarker:
             return [*followed, *new]
         limit = self._config.max_hands
         room = max(limit - len(followed), min(1, limit - 1))
-        had = {region for region in new if any(region.overlap(one) > SAME_HAND_OVERLAP for one in self._had_turn)}
+        had = {region for region in new if any(region.overlap(one) > _SAME_TURN_OVERLAP for one in self._had_turn)}
         if len(had) == len(new):
             self._had_turn, had = followed[limit - room :], set()
         chosen = sorted(new, key=lambda region: region in had)[:room]

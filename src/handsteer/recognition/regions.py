@@ -36,17 +36,6 @@ With 0.3, a fifth of the hands that only a smoothed frame shows are not found; w
 """
 
 
-_TINT: Final = (1.5, 1.15, 0.8)
-"""Exponents that give grey levels, 0 to 1, a colour like skin: blue, green, red.
-
-The palm model was trained on colours, and misses grey hands. The landmark model reads grey hands as well untinted.
-"""
-_GREY: Final = 8
-"""Largest difference between the colours of a pixel of a grey picture, as after compression, in levels of 255."""
-_SAMPLED: Final = 5
-"""Distance between the pixels of a model's input that are examined for colours, in pixels."""
-
-
 @dataclass(frozen=True)
 class Roi:
     """A rotated square in a frame; all lengths in pixels.
@@ -181,7 +170,6 @@ class Detector:
         min_score: Minimum score, 0 to 1.
         doubtful_score: Score from which doubtful detections are returned too, after all others, which they do not
             change; at most ``min_score``, which is used if None.
-        tint: Whether to give grey pictures a colour like skin, except smoothed ones: each way finds other hands.
     """
 
     def __init__(
@@ -190,11 +178,8 @@ class Detector:
         grids: Sequence[tuple[int, int]],
         min_score: float,
         doubtful_score: float | None = None,
-        *,
-        tint: bool = False,
     ) -> None:
         self._model = model
-        self._tint = tint
         self._min_score = min_score
         self._min_logit = _logit(min_score if doubtful_score is None else doubtful_score)
         self._anchors = _anchors(model.side, grids)
@@ -219,8 +204,6 @@ class Detector:
         square = whole_frame(width, height, widened)
         seen, region = _reduced(image, square, self._model.side) if smoothed else (image, square)
         picture = region.crop(seen, self._model.side, cv2.BORDER_CONSTANT)
-        if self._tint and not smoothed and _is_grey(picture):
-            picture = np.asarray(cv2.LUT(picture, _TINTED), np.uint8)
         values, logits = self._model.run(picture)
         logits = logits[:, 0]
         found = np.flatnonzero(logits >= self._min_logit)
@@ -245,7 +228,7 @@ class PalmDetector:
 
     def __init__(self, path: Path, threads: int, min_score: float, doubtful_score: float | None = None) -> None:
         self._min_score = min_score
-        self._detector = Detector(PictureModel(path, threads), _PALM_GRIDS, min_score, doubtful_score, tint=True)
+        self._detector = Detector(PictureModel(path, threads), _PALM_GRIDS, min_score, doubtful_score)
 
     def detect(
         self, image: NDArray[np.uint8], limit: int, *, widened: float = 1.0, smoothed: bool = False
@@ -253,16 +236,6 @@ class PalmDetector:
         """Return at most ``limit`` palms, as :meth:`Detector.find` describes."""
         found = self._detector.find(image, limit, widened=widened, smoothed=smoothed)
         return [Palm(each[:2], each[2:], score, score >= self._min_score) for each, score in found]
-
-
-def _is_grey(image: NDArray[np.uint8]) -> bool:
-    """Return whether a sample of the pixels of ``image``, (height, width, 3), has no colours."""
-    some = image[::_SAMPLED, ::_SAMPLED]
-    return bool((some.max(axis=2) - some.min(axis=2)).max() <= _GREY)
-
-
-_TINTED: Final = np.stack([255 * (np.arange(256) / 255) ** power for power in _TINT], axis=-1).astype(np.uint8)[None]
-"""(1, 256, 3) tinted colour of each grey level."""
 
 
 def _reduced(image: NDArray[np.uint8], square: Roi, side: int) -> tuple[NDArray[np.uint8], Roi]:
