@@ -92,7 +92,7 @@ def _loss(teacher: PalmNetwork, learner: PalmNetwork, pictures: Pictures) -> tor
     clean = [pictures.clean() for _ in range(_BATCH)]
     spoilt = [pictures.spoilt(each) if pictures.chance(_SPOILT) else each for each in clean]
     cut = [pictures.cut_off(each) for each in spoilt]
-    # Palms whose middle is beyond the end of the frame are no palms.
+    # Palms whose middle is beyond the end of the frame do not count.
     x, y = np.floor(_anchors()).astype(int).T
     counted = torch.tensor(np.stack([seen[y, x] for _, seen in cut]), dtype=torch.float32)
     with torch.no_grad():
