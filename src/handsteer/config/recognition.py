@@ -77,8 +77,8 @@ class LandmarksConfig(Section):
 
     model: Literal["fast", "full", "lite"] = Field(
         "fast",
-        description="full is MediaPipe's own; fast is full in 8-bit integers, takes half the time and differs by up "
-        "to a quarter of a pixel; lite is as fast, but less accurate",
+        description="full is MediaPipe's own; fast is full in 8-bit integers, takes half the time, differs by up "
+        "to a quarter of a pixel, and finds more hands in grey or dark pictures; lite is as fast, but less accurate",
     )
     max_hands: int = Field(
         2,

@@ -1094,7 +1094,7 @@ const WORDS = {
 
   // Parameters: finding hands
   "Model": "Modell",
-  "full is MediaPipe's own; fast is full in #-bit integers, takes half the time and differs by up to a quarter of a pixel; lite is as fast, but less accurate.": "full ist MediaPipes eigenes; fast ist full in ganzen Zahlen mit #-Bit, braucht die halbe Zeit und weicht um bis zu ein Viertel Pixel ab; lite ist so schnell, aber weniger genau.",
+  "full is MediaPipe's own; fast is full in #-bit integers, takes half the time, differs by up to a quarter of a pixel, and finds more hands in grey or dark pictures; lite is as fast, but less accurate.": "full ist MediaPipes eigenes; fast ist full in ganzen Zahlen mit #-Bit, braucht die halbe Zeit, weicht um bis zu ein Viertel Pixel ab und findet mehr Hände in grauen oder dunklen Bildern; lite ist so schnell, aber weniger genau.",
   "Maximum hands": "Höchstzahl der Hände",
   "Maximum number of hands in a frame, from which the one that shows a sign is selected.": "Höchstzahl der Hände in einem Bild, von denen die gewählt wird, die ein Zeichen zeigt.",
   "Minimum detection confidence": "Mindestsicherheit beim Finden",
