@@ -1,6 +1,6 @@
 """Decides where to search for new hands, and when: not in a picture that has not changed.
 
-Palms are detected in the plain frame as MediaPipe does. The palm model misses hands in dark, noisy pictures, so palms
+Palms are detected in the plain frame as MediaPipe does. A palm model misses hands in dark, noisy pictures, so palms
 are also detected in a smoothed frame, in which it misses some small hands instead; and hands that nearly fill a frame,
 fists above all, so palms are also detected in a widened frame, where they appear smaller. While there is no hand, palms
 of a low score count too if the landmark model is sure of their hands, and that model is applied to the middle of the
