@@ -1141,3 +1141,14 @@ def test_whether_the_hand_drives_can_be_asked() -> None:
     bench = ControlBench(engage=True)
     assert bench.control.services()["engage_state"]() == "disengaged: open, close and open your hand to begin"
     assert ControlBench().control.services()["engage_state"]() == "engaged"
+
+
+def test_who_asks_whether_the_hand_drives_hears_of_a_stop() -> None:
+    bench = ControlBench()
+    call = bench.control.services()
+    call["stop"]()
+    bench.run(0.1)
+    assert call["engage_state"]() == "engaged; stopped, until it is reset"
+    call["reset"]()
+    bench.run(0.1)
+    assert call["engage_state"]() == "engaged"

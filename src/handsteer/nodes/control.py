@@ -51,6 +51,7 @@ log = logging.getLogger(__name__)
 
 _WATCHDOG_PERIOD_S = 0.02
 _DIAGNOSE_PERIOD_S = 0.1
+_STOPPED = "stopped, until it is reset"
 
 
 class HandSignControlNode(Node):
@@ -162,18 +163,19 @@ class HandSignControlNode(Node):
         self._joysticks.listen(hand=self._config.by_stick or by_gesture, gamepad=self._config.mode == "joystick")
 
     def services(self) -> dict[str, Call]:
-        """Return ``stop`` and ``reset``, as true and false on ``/stop``, and ``engage_state``: is the hand engaged?"""
+        """Return ``stop`` and ``reset``, as true and false on ``/stop``, and ``engage_state``, engaged or stopped?"""
         publisher = self.publisher(STOP)
 
         def publish(is_stopped: bool) -> str:
             publisher.publish(Bool(data=is_stopped))
-            return "stopped, until it is reset" if is_stopped else "reset"
+            return _STOPPED if is_stopped else "reset"
 
         return {"stop": lambda: publish(True), "reset": lambda: publish(False), "engage_state": self._engage_state}
 
     def _engage_state(self) -> str:
         engagement = self._safety.engagement
-        return "engaged" if engagement.engaged else str(engagement.reason)
+        state = "engaged" if engagement.engaged else str(engagement.reason)
+        return f"{state}; {_STOPPED}" if self._safety.is_stopped else state
 
     def on_activate(self) -> None:
         """Wait for neutral, and for the gesture that engages: what was shown before does not count."""
