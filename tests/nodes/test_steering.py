@@ -6,7 +6,7 @@ import pytest
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
 from handsteer.errors import TransportError
-from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic, Twist, TwistStamped, cmd_vel, twist_in
+from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, STOPPED, Bool, Topic, Twist, TwistStamped, cmd_vel, twist_in
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.base import Received
 from handsteer.transports.in_process import InProcessTransport
@@ -142,13 +142,29 @@ def test_stop_holds_past_the_control_until_it_is_reset_and_steering_begins_anew(
         bench.step()
         bench.node.steer(0.3, 0.0)
     assert set(bench.robot[heard:]) == {(0.0, 0.0)}
+    let_go_once(bench)
     bench.node.reset()
     bench.step()
     bench.node.steer(0.3, 0.0)
-    assert bench.robot[-1] == (0.0, 0.0)
+    assert bench.robot[-1] == (0.0, 0.0), "a release during the Stop does not count"
     let_go_once(bench)
     bench.node.steer(0.3, 0.0)
     assert bench.robot[-1] == (0.3, 0.0)
+
+
+@pytest.mark.parametrize("topic", [STOP, STOPPED])
+def test_a_stop_from_before_another_topic_was_chosen_holds_there(bench: Bench, topic: Topic[Bool]) -> None:
+    bench.transport.advertise("test", topic).publish(Bool(data=True))
+    bench.step()
+    bench.node.send_to("/cmd_vel")
+    for velocity in (0.0, 0.3, 0.3):
+        bench.node.steer(velocity, 0.0)
+        bench.step()
+    assert bench.node.is_stopped
+    assert set(bench.robot) == {(0.0, 0.0)}
+    bench.stop(on=False)
+    bench.node.steer(0.3, 0.0)
+    assert bench.robot[-1] == (0.0, 0.0)
 
 
 def test_a_stop_of_others_holds_past_the_control_too(bench: Bench) -> None:

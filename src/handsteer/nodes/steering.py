@@ -14,7 +14,7 @@ from handsteer.nodes.base import Node
 from handsteer.nodes.supervision import StopKeeper
 from handsteer.nodes.timing import StallGuard
 from handsteer.timeouts import STALE_S
-from handsteer.transports.base import Received, Transport
+from handsteer.transports.base import Transport
 from handsteer.transports.commands import Commands
 from handsteer.types import ZERO, Velocity
 
@@ -65,7 +65,7 @@ class SteeringNode(Node):
         self._lock = threading.RLock()
         self._wanted: Velocity | None = None
         self._halted = False
-        self._heard_stop: bool | None = None
+        self._heard_stop = False
         self._stall_guard = StallGuard(STALE_S, clock.now())
         self._was_held_up = False
         self._safety = Safety(self._config, arming=False)
@@ -75,7 +75,7 @@ class SteeringNode(Node):
         self._target = self._to(steering.name, steering, is_direct=False)
         self._targets = {self._target.name: self._target}
         self._stop = self.publisher(STOP)
-        StopKeeper(self)
+        StopKeeper(self, self._on_stop_or_reset)
         self.every(_PERIOD_S, self._repeat)
 
     @property
@@ -90,8 +90,8 @@ class SteeringNode(Node):
 
     @property
     def is_stopped(self) -> bool:
-        """Whether a Stop is active: from here, or on ``/stop`` since commands went to another topic."""
-        return self._halted or bool(self._heard_stop)
+        """Whether a Stop is active: from here, or one of others where the control is bypassed, which has it else."""
+        return self._halted or (self.is_direct and self._heard_stop)
 
     @property
     def waits(self) -> bool:
@@ -156,6 +156,8 @@ class SteeringNode(Node):
     def reset(self) -> None:
         """End a Stop; nothing moves until the active input has shown neutral."""
         with self._lock:
+            if self._halted:
+                self._safety.disarm()
             self._halted = False
             self._stop.publish(Bool(data=False))
 
@@ -180,9 +182,6 @@ class SteeringNode(Node):
         topic = Topic(name if is_global else f"/{name}", self._cmd_vel.type, is_global=is_global, depth=CMD_VEL.depth)
         topic = replace(topic, or_type=self._cmd_vel.or_type)
         target = self._to(name, topic, is_direct=True)
-        if self._heard_stop is None:
-            self._heard_stop = False
-            self.subscribe(STOP, self._on_stop_or_reset)
         self._targets[name] = target
         return target
 
@@ -203,11 +202,13 @@ class SteeringNode(Node):
             return ZERO
         return wanted.clamped(self._config.max_linear, self._config.max_angular)
 
-    def _on_stop_or_reset(self, received: Received[Bool]) -> None:
+    def _on_stop_or_reset(self, is_stopped: bool) -> None:
         with self._lock:
-            self._heard_stop = bool(received.message.data)
-            if self._heard_stop:
+            was_stopped, self._heard_stop = self.is_stopped, is_stopped
+            if self.is_direct and is_stopped:
                 self._stand()
+            elif was_stopped and not self.is_stopped:
+                self._safety.disarm()
 
     def _stand(self) -> None:
         """Clear the requested velocity; if the control is bypassed, send a zero."""
