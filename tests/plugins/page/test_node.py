@@ -260,6 +260,7 @@ def test_who_watches_cannot_steer_until_the_driver_has_left(bench: Bench) -> Non
     press(bench, "driver", 0.3)
     bench.node.steer("watcher", -0.4, 0.0)
     assert bench.steered == [(0.3, 0.0)]
+    bench.node.release("driver")
     bench.node.leave("driver")
     assert bench.steered[-1] == (0.0, 0.0)
     bench.node.steer("watcher", -0.4, 0.0)
@@ -285,6 +286,18 @@ def test_the_robot_stops_when_another_takes_over(bench: Bench) -> None:
     bench.node.steer("driver", 0.3, 0.0)
     bench.step(0.1)
     assert bench.steered[-1] == (0.0, 0.0)
+
+
+def test_what_a_page_held_when_its_connection_ended_has_to_be_released(bench: Bench) -> None:
+    bench.node.steer("driver", 0.0, 0.0)
+    bench.node.steer("driver", 0.3, 0.0)
+    bench.node.leave("driver")
+    bench.step(2.0)
+    bench.node.steer("driver", 0.3, 0.0)  # it is connected again, with the pad held as before
+    assert bench.steered[-1] == (0.0, 0.0)
+    bench.node.steer("driver", 0.0, 0.0)
+    bench.node.steer("driver", 0.3, 0.0)
+    assert bench.steered[-1] == (0.3, 0.0)
 
 
 def test_leaves_nothing_in_motion_when_it_stops(bench: Bench) -> None:

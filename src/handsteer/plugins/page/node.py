@@ -197,8 +197,10 @@ class DashboardNode(Node):
             self.lease.answer(driver, hand_over=True)
 
     def leave(self, viewer: str) -> None:
-        """Stop if ``viewer`` is steering, and release its lease."""
-        self.release(viewer)
+        """Stop if ``viewer`` is steering, and release its lease; what is held when it comes back has to be released."""
+        with self._lock:
+            if self._holder is not None and self._holder[0] == viewer:
+                self._lose()
         self.lease.leave(viewer)
 
     def on_stop(self) -> None:
@@ -206,6 +208,11 @@ class DashboardNode(Node):
         with self._lock:
             if self._holder is not None:
                 self.release(self._holder[0])
+
+    def _lose(self) -> None:
+        """End steering of which it is not known whether the person has released it."""
+        self._holder = None
+        self._steering.lose()
 
     def _person(self, who: str | None, viewer: str) -> Person:
         return "" if not who else "you" if who == self._audit.person_of(viewer) else "another viewer"
@@ -217,8 +224,7 @@ class DashboardNode(Node):
         with self._lock:
             holder, now = self._holder, self.clock.now()
             if holder is not None and (now - holder[1] > HOLD_TIMEOUT_S or not self.lease.drives(holder[0])):
-                self._holder = None
-                self._steering.lose()  # whether the person has released it is not known
+                self._lose()
 
     def _sample(self) -> None:
         now, observed = self.clock.now(), self._observed
