@@ -223,16 +223,16 @@ def joy_of(stick: Stick, header: Header, *, engages: bool = False, pointing: Sti
     return Joy(header=header, axes=axes, buttons=np.array([stick.held, engages, pointing.held], np.int32))
 
 
+_NOT_VALID = Stick(True, math.nan, math.nan)
+
+
 def engages_in(message: Joy) -> bool:
     """Return whether the hand has just made the gesture that engages, in a message from any source."""
     return len(message.buttons) > 1 and bool(message.buttons[1])
 
 
 def pointing_in(message: Joy) -> Stick:
-    """Return where the hand points in a message of :data:`GESTURE_JOY`, from any source; released if it says nothing.
-
-    Axes are clamped to -1 to 1.
-    """
+    """Return where the hand points in a message of :data:`GESTURE_JOY`, from any source, as :func:`stick_in` does."""
     return stick_in(message, enable_button=2, axis_linear=3, axis_angular=2)
 
 
@@ -246,15 +246,18 @@ def stick_in(message: Joy, *, enable_button: int = 0, axis_linear: int = 1, axis
         axis_angular: Index of the axis for left.
 
     Returns:
-        Axes clamped to -1 to 1; not held if the button or an axis is missing, or an axis is not finite.
+        Axes clamped to -1 to 1; not valid (:attr:`~handsteer.types.Stick.is_valid`) if the button or an axis is
+        missing, or the axis of a pressed button is not finite.
     """
     buttons, axes = message.buttons, message.axes
-    if enable_button >= len(buttons) or max(axis_linear, axis_angular) >= len(axes) or not buttons[enable_button]:
+    if enable_button >= len(buttons) or max(axis_linear, axis_angular) >= len(axes):
+        return _NOT_VALID
+    if not buttons[enable_button]:
         return RELEASED
-    forward, left = float(axes[axis_linear]), float(axes[axis_angular])
-    if not (math.isfinite(forward) and math.isfinite(left)):
-        return RELEASED
-    return Stick(True, max(-1.0, min(forward, 1.0)), max(-1.0, min(left, 1.0)))
+    stick = Stick(True, float(axes[axis_linear]), float(axes[axis_angular]))
+    if not stick.is_valid:
+        return _NOT_VALID
+    return Stick(True, max(-1.0, min(stick.forward, 1.0)), max(-1.0, min(stick.left, 1.0)))
 
 
 def yaw_of(quaternion: Quaternion) -> float:

@@ -185,6 +185,11 @@ class Stick:
     forward: float = 0.0
     left: float = 0.0
 
+    @property
+    def is_valid(self) -> bool:
+        """Whether both deflections are finite; if not, the state is not known, so it is no release either."""
+        return math.isfinite(self.forward) and math.isfinite(self.left)
+
 
 RELEASED = Stick()
 

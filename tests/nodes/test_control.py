@@ -1073,6 +1073,52 @@ def test_steering_that_was_held_while_the_control_was_stalled_has_to_let_go() ->
     assert bench.last() == (0.5, 0)
 
 
+NO_JOYS = {
+    "not a number": Joy(HEADER, np.array([0.0, math.nan], np.float32), np.array([1, 0, 1], np.int32)),
+    "infinite": Joy(HEADER, np.array([0.0, math.inf, 0.0, math.inf], np.float32), np.array([1, 0, 1], np.int32)),
+    "no axes": Joy(HEADER, np.zeros(0, np.float32), np.array([1, 0, 1], np.int32)),
+    "empty": Joy(HEADER, np.zeros(0, np.float32), np.zeros(0, np.int32)),
+}
+
+
+@pytest.mark.parametrize("wrong", NO_JOYS)
+def test_a_message_of_a_gamepad_that_is_not_valid_is_not_a_release(wrong: str) -> None:
+    bench = ControlBench(ControlConfig(mode="joystick"), arming=True)
+    bench.hold(*[AHEAD] * 60, on=bench.gamepad)  # held since the start
+    bench.gamepad.publish(NO_JOYS[wrong])
+    bench.run(1 / 30)
+    bench.hold(*[AHEAD] * 10, on=bench.gamepad)
+    assert set(bench.commands) == {(0, 0)}
+    bench.hold(RELEASED, *[AHEAD] * 5, on=bench.gamepad)
+    assert bench.last()[0] > 0
+    bench.gamepad.publish(NO_JOYS[wrong])  # and while it drives, it stops
+    bench.run(1 / 30)
+    bench.hold(*[AHEAD] * 10, on=bench.gamepad)
+    assert bench.last() == (0, 0)
+
+
+@pytest.mark.parametrize("wrong", NO_JOYS)
+@pytest.mark.parametrize("config", [ControlConfig(mode="joystick"), ControlConfig(rule="point")])
+def test_a_message_of_the_hand_that_is_not_valid_is_not_a_release(wrong: str, config: ControlConfig) -> None:
+    bench = ControlBench(config)
+
+    def show(*sticks: Stick) -> None:
+        for stick in sticks:
+            joy = joy_of(RELEASED, HEADER, pointing=stick) if config.points else joy_of(stick, HEADER)
+            bench.signs.publish(String(data="Forward" if stick.held else "NONE"), bench.clock.now())
+            bench.joys.publish(joy, bench.clock.now())
+            bench.run(1 / 30)
+
+    show(*[RELEASED] * 30, *[AHEAD] * 30)
+    assert bench.last()[0] > 0
+    bench.joys.publish(NO_JOYS[wrong], bench.clock.now())
+    bench.run(1 / 30)
+    show(*[AHEAD] * 10)
+    assert bench.last() == (0, 0)
+    show(*[RELEASED] * 30, *[AHEAD] * 30)
+    assert bench.last()[0] > 0
+
+
 def test_the_axes_of_any_joystick_are_read_within_one() -> None:
     """The guard: the limits in ``stick_in``."""
     assert stick_in(joy_of(Stick(held=True, forward=50.0, left=-1e30), HEADER)) == Stick(True, 1.0, -1.0)

@@ -82,6 +82,9 @@ class Control:
             sign = self._admitted(sign)
         if not self._config.by_stick:
             stick = None
+        elif stick is not None and not stick.is_valid:
+            self.safety.fault("a state of the joystick was not valid")
+            stick = RELEASED
         elif stick is not None and not self.safety.admits_stick(held=stick.held):
             stick = RELEASED
         if steering is not None and not self.safety.admits_steering(

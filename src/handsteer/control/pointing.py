@@ -22,7 +22,7 @@ def pointed(stick: Stick, now: Velocity, config: ControlConfig, dt_s: float) -> 
         config: Limits and times.
         dt_s: Seconds, >= 0.
     """
-    if not (stick.held and math.isfinite(stick.forward) and math.isfinite(stick.left)):
+    if not (stick.held and stick.is_valid):
         return ZERO
     linear, angular = now.linear_mps, 0.0
     if stick.forward:

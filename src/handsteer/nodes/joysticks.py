@@ -82,5 +82,8 @@ class Joysticks:
         if not self._is_new(received.captured_s):
             return
         stick = stick_in(received.message, **self._rule)
-        was_held, self._is_gamepad_held = self._is_gamepad_held, stick.held
+        was_held = self._is_gamepad_held
+        if not stick.is_valid and not was_held:
+            return  # neither a release, nor something to follow
+        self._is_gamepad_held = stick.held
         self._on_gamepad(stick, received, is_at_rest=not (stick.held or was_held))

@@ -111,7 +111,9 @@ def _in_words(topic: str, raw: bytes, kind: str) -> str:
     if topic == GESTURE_JOY.name:
         stick = stick_in(message)
         points = pointing_in(message)
-        if points.held and not stick.held:
+        if not stick.is_valid:
+            return "not valid"
+        if points.held and points.is_valid and not stick.held:
             return f"points {points.forward:+.3f} forward, {points.left:+.3f} left"
         return f"{stick.forward:+.3f} forward, {stick.left:+.3f} left" if stick.held else "released"
     velocity = twist_in(message)

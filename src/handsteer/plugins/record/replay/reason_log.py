@@ -105,12 +105,12 @@ class ReasonLog:
     def note_joystick(self, time_s: float, message: Joy) -> None:
         """Note the state of the hand as a joystick, or where it points."""
         stick = (pointing_in if self._rule.points else stick_in)(message)
-        self._note("joystick", time_s, self._rule.sign_timeout, on=stick.held)
+        self._note("joystick", time_s, self._rule.sign_timeout, on=stick.held and stick.is_valid)
 
     def note_gamepad(self, time_s: float, message: Joy) -> None:
         """Note the state of a gamepad."""
-        on = stick_in(message, **self._gamepad).held
-        self._note("gamepad", time_s, self._rule.steering_timeout, on=on)
+        stick = stick_in(message, **self._gamepad)
+        self._note("gamepad", time_s, self._rule.steering_timeout, on=stick.held and stick.is_valid)
 
     def note_stop(self, time_s: float, *, is_stopped: bool) -> None:
         """Note ``/stop``."""
