@@ -134,6 +134,17 @@ def test_a_stick_that_does_not_move_has_to_be_released() -> None:
     assert drives_s(control, stick=Stick(True, 0.5, 0.1)) == pytest.approx(3.0)
 
 
+def test_a_fist_that_keeps_the_speed_of_pointing_has_to_be_released() -> None:
+    control = Control(RENEW.model_copy(update={"rule": "point"}), arming=False, renew=True)
+    show_for(control, 1.0, sign=NONE, stick=Stick())
+    show_for(control, 2.0, sign=FORWARD, stick=Stick(True, 1.0))
+    assert drives_s(control, sign=GO, stick=Stick(True)) == pytest.approx(3.0)
+    assert drives_s(control, sign=FORWARD, stick=Stick(True, 1.0)) == 0.0, "a movement is not a release"
+    show_for(control, 1.0, sign=NONE, stick=Stick())
+    show_for(control, 1.0, sign=FORWARD, stick=Stick(True, 1.0))
+    assert control.mux.velocity.linear_mps > 0
+
+
 @pytest.mark.parametrize(("tremor", "expected_s"), [(0.02, 3.0), (0.06, math.inf)])
 def test_a_stick_that_trembles_has_not_moved(tremor: float, expected_s: float) -> None:
     control = Control(JOYSTICK, arming=False, renew=True)

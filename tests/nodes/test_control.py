@@ -1098,6 +1098,16 @@ def test_a_message_of_a_gamepad_that_is_not_valid_is_not_a_release(wrong: str) -
 
 
 @pytest.mark.parametrize("wrong", NO_JOYS)
+def test_a_gamepad_that_says_nothing_valid_leaves_the_robot_to_the_hand(wrong: str) -> None:
+    bench = ControlBench(ControlConfig(mode="joystick"))
+    bench.hold(RELEASED, AHEAD)
+    for _ in range(10):
+        bench.gamepad.publish(NO_JOYS[wrong])
+        bench.hold(AHEAD)
+    assert bench.last()[0] > 0
+
+
+@pytest.mark.parametrize("wrong", NO_JOYS)
 @pytest.mark.parametrize("config", [ControlConfig(mode="joystick"), ControlConfig(rule="point")])
 def test_a_message_of_the_hand_that_is_not_valid_is_not_a_release(wrong: str, config: ControlConfig) -> None:
     bench = ControlBench(config)

@@ -136,7 +136,8 @@ class Control:
         if sign is not None:
             renewal.note("signs", sign)
         if stick is not None:
-            renewal.note("joystick", (stick.forward, stick.left) if stick.held else (0.0, 0.0))
+            # A fist that is held in the middle keeps the speed of pointing: it is no release.
+            renewal.note("joystick", (float(stick.held), stick.forward, stick.left))
         if steering is not None:
             renewal.note(by, (steering.linear_mps / config.max_linear, steering.angular_radps / config.max_angular))
 
