@@ -144,6 +144,20 @@ def test_a_scan_that_stops_coming_stops_the_robot() -> None:
     assert bench.report()[0].startswith("standing: no laser scan has come for 0.")
 
 
+@pytest.mark.parametrize("ahead_s", [0.0, 30.0])
+def test_a_scanner_that_repeats_its_last_message_stops_the_robot(ahead_s: float) -> None:
+    bench = MonitorBench()
+    bench.show("Forward", 10, ahead(7.0), age_s=-ahead_s)
+    assert bench.command[0] > 0.0
+    stamped_s = bench.clock.now() + ahead_s
+    last = scan_message(Header(bench.clock.stamp(stamped_s), "base_scan"), ahead(7.0))
+    for _ in range(30):
+        bench.scans.publish(last, stamped_s)
+        bench.show("Forward")
+    assert bench.command == (0.0, 0.0)
+    assert bench.report()[0].startswith("standing: no laser scan has come for 1.")
+
+
 def test_scans_that_come_late_stop_the_robot_and_it_says_so() -> None:
     bench = MonitorBench()
     bench.show("Forward", 10, ahead(7.0), age_s=2.0)

@@ -46,7 +46,7 @@ def test_a_scan_that_is_the_same_after_a_motion_is_frozen(moved: Pose) -> None:
     [
         pytest.param(scan(), scan(stamp_s=1), pose(0.05, 0.05), id="hardly moved"),
         pytest.param(scan(), scan(2.8, stamp_s=1), pose(0.2), id="another scan"),
-        pytest.param(scan(), scan(), pose(0.2), id="the same message again"),
+        pytest.param(scan(stamp_s=1), scan(stamp_s=1), pose(0.2), id="the same message again"),
         pytest.param(scan(99.0), scan(99.0, stamp_s=1), pose(0.2), id="a long corridor"),
         pytest.param(scan(99.0, 99.0), scan(99.0, 99.0, stamp_s=1), pose(0.2, 0.5), id="nothing in view"),
     ],
@@ -81,6 +81,10 @@ def test_a_scanner_that_freezes_stops_the_robot_which_stays_stopped(assist: str)
     assert "the laser scans do not change while the robot moves" in message
     drive.steer(0.5, 0.0, 2.0)
     assert abs(drive.robot.state.linear_mps) < 0.01
+
+
+def test_scans_without_stamps_are_frozen_too() -> None:
+    assert is_frozen(scan(), scan(), pose(0.2))
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -6,7 +6,18 @@ import pytest
 from handsteer.clock import SteppedClock
 from handsteer.config import ControlConfig
 from handsteer.errors import TransportError
-from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, STOPPED, Bool, Topic, Twist, TwistStamped, cmd_vel, twist_in
+from handsteer.messages import (
+    CMD_VEL,
+    STEERING_CMD_VEL,
+    STOP,
+    STOPPED,
+    Bool,
+    Topic,
+    Twist,
+    TwistStamped,
+    cmd_vel,
+    twist_in,
+)
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.base import Received
 from handsteer.transports.in_process import InProcessTransport

@@ -14,6 +14,7 @@ from handsteer.messages import LaserScan, Odometry, Pose, Topic
 from handsteer.nodes.base import Node
 from handsteer.nodes.frozen_scans import FrozenScans
 from handsteer.transports.base import Received
+from handsteer.transports.timing import Repeats
 from handsteer.types import Velocity
 
 
@@ -64,6 +65,7 @@ class CollisionMonitor:
         self._came_s = -math.inf
         self._measured = MeasuredVelocity()
         self._is_broken = False
+        self._repeats = Repeats()
         self._frozen, self._is_frozen = FrozenScans(), False
         self._stands = False
         self._kind = "off"
@@ -140,6 +142,8 @@ class CollisionMonitor:
 
     def _on_scan(self, received: Received[LaserScan]) -> None:
         now = self._node.clock.now()
+        if self._repeats.has(received.message.header.stamp, now):
+            return  # a scanner that hangs says nothing of now, whatever its stamps
         self._came_s = now
         if self._freezes(received.message):
             return

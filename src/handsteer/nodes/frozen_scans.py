@@ -5,8 +5,9 @@ import math
 import numpy as np
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.messages import LaserScan, Pose
+from handsteer.messages import LaserScan, Pose, Time
 
+_NO_STAMP = Time(0, 0)
 _MOVED_M, _TURNED_RAD = 0.1, 0.1
 # Walls that are parallel to a straight way look the same all along it; at this angle and distance nothing can be one.
 _AHEAD_RAD, _NEAR_M = math.radians(5), 4.0
@@ -31,13 +32,14 @@ class FrozenScans:
     def note(self, scan: LaserScan, rule: CollisionMonitorConfig) -> tuple[bool, bool]:
         """Return whether ``scan`` is the same as the one before, and whether it is frozen.
 
-        With the same stamp, it is the same message again, which is old, but not frozen.
+        With the same stamp, it is the same message again, which is old, but not frozen; without one, that is not known.
         """
         before, self._scan = self._scan, scan
         if before is None or self._since is None or not _is_same(before, scan):
             self._since = self._pose
             return False, False
-        if self._pose is None or before.header.stamp == scan.header.stamp:
+        is_again = before.header.stamp == scan.header.stamp != _NO_STAMP
+        if self._pose is None or is_again:
             return True, False
         moved_m = math.dist(_place(self._pose), _place(self._since))
         turned_rad = abs(math.remainder(_yaw(self._pose) - _yaw(self._since), math.tau))
