@@ -1,4 +1,5 @@
 import re
+from typing import ClassVar
 
 import pytest
 
@@ -7,6 +8,7 @@ from handsteer.errors import WorldError
 from handsteer.making import open_robot
 from handsteer.messages import (
     CLOCK,
+    CMD_VEL,
     DIAGNOSTICS,
     ODOM,
     TF,
@@ -21,8 +23,9 @@ from handsteer.messages import (
 from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.status import RobotStatus
+from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.robots.editing import add, edit, remove
-from handsteer.robots.world import load_world
+from handsteer.robots.world import World, load_world
 from handsteer.types import CourseState, Pose2D
 from tests.nodes.stepping import Bench
 
@@ -87,6 +90,27 @@ def test_after_it_was_held_up_it_brakes_and_obeys_nothing_that_waited() -> None:
     assert bench.newest.twist.twist.linear.x == pytest.approx(0.0, abs=0.02)
     bench.drive(1.0)
     assert bench.newest.twist.twist.linear.x == pytest.approx(0.3, abs=0.02)
+
+
+def test_what_it_does_by_itself_is_no_command_to_a_robot_that_waits_for_a_zero() -> None:
+    class Waiting(SimulatedRobot):
+        commanded: ClassVar[list[float]] = []
+        stood = 0
+
+        def command(self, linear_mps: float, angular_radps: float) -> None:
+            self.commanded.append(linear_mps)
+
+        def stand(self) -> None:
+            self.stood += 1
+
+    bench = Bench()
+    robot = Waiting(RobotConfig(), World())
+    bench.nodes = [RobotNode(bench.transport, bench.clock, robot, RobotConfig())]
+    bench.transport.advertise("control", CMD_VEL).publish(twist(0.3, 0.0))
+    bench.run(0.1)
+    bench.clock.advance(5.0)
+    bench.run(0.1)
+    assert (robot.commanded, robot.stood) == ([0.3], 1)
 
 
 def test_it_says_that_it_stands_for_want_of_commands() -> None:

@@ -1,6 +1,7 @@
 import math
 from itertools import pairwise
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -105,6 +106,30 @@ def test_not_a_number_is_a_zero() -> None:
     relay = linked()
     drive(relay, AHEAD, 1.0)
     assert relay.command(Velocity(math.nan, 0.0)) == ZERO
+
+
+def away_and_back() -> CommandLimiter:
+    relay = linked()
+    drive(relay, AHEAD, 1.0)
+    drive(relay, AHEAD, 0.2, is_linked=False)
+    assert set(drive(relay, AHEAD, 1.0)) == {ZERO}
+    return relay
+
+
+@pytest.mark.parametrize("wrong", [Velocity(math.nan, 0.0), Velocity(0.0, math.inf)])
+def test_not_a_number_releases_no_robot_that_was_away(wrong: Velocity) -> None:
+    relay = away_and_back()
+    relay.command(wrong)
+    assert set(drive(relay, AHEAD, 1.0)) == {ZERO}
+
+
+def test_to_stand_without_a_command_releases_no_robot_that_was_away() -> None:
+    relay = away_and_back()
+    relay.stand()
+    assert set(drive(relay, AHEAD, 1.0)) == {ZERO}
+    relay.command(ZERO)
+    assert drive(relay, AHEAD, 1.0)[-1] == AHEAD
+    assert relay.stand() == ZERO
 
 
 def test_a_zero_before_the_link_does_not_count() -> None:

@@ -45,7 +45,7 @@ from handsteer.nodes.status import RobotStatus
 from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.surroundings import Surroundings
 from handsteer.nodes.timing import StallGuard
-from handsteer.robots import RangeScan, Robot, RobotState
+from handsteer.robots import RangeScan, Robot, RobotState, Waiting
 from handsteer.robots.editing import Change
 from handsteer.robots.world import World
 from handsteer.transports.base import Call, Received, Transport
@@ -173,7 +173,11 @@ class RobotNode(Node):
             self._stand()
 
     def _stand(self) -> None:
-        self._drive(ZERO)
+        if isinstance(self._robot, Waiting):
+            self._command, self._commanded_s = ZERO, self.clock.now()
+            self._robot.stand()
+        else:
+            self._drive(ZERO)
 
     def _start_again(self) -> None:
         self.state = self._robot.step(0.0)

@@ -129,6 +129,15 @@ class Robot(Protocol):
 
 
 @runtime_checkable
+class Waiting(Robot, Protocol):
+    """A robot that waits for a commanded zero after it was away."""
+
+    def stand(self) -> None:
+        """Stop, although no zero was commanded."""
+        ...
+
+
+@runtime_checkable
 class InWorld(Robot, Protocol):
     """A robot in a world that can be changed, such as a simulated one.
 

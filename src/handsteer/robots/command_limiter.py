@@ -46,13 +46,16 @@ class CommandLimiter:
         return self._age_s < self._config.cmd_vel_timeout - _SLACK_S
 
     def command(self, wanted: Velocity) -> Velocity | None:
-        """Take a command; return what to send now, or None. One that is not finite counts as zero."""
-        self._wanted = wanted if wanted.is_finite else ZERO
-        self._age_s = 0.0
-        self._zeros_left = _LAST_ZEROS
-        if self._linked and self._wanted == ZERO:
+        """Take a command; return what to send now, or None. For one that is not finite the robot stands."""
+        if not wanted.is_finite:
+            return self.stand()
+        if self._linked and wanted == ZERO:
             self.holds = False
-        return self._advance(0.0)
+        return self._take(wanted)
+
+    def stand(self) -> Velocity | None:
+        """Stop as by a zero, which was not commanded: a robot that waits for one still does."""
+        return self._take(ZERO)
 
     def step(self, dt_s: float, *, linked: bool) -> Velocity | None:
         """Advance time by ``dt_s`` seconds; return what to send now, or None.
@@ -66,6 +69,10 @@ class CommandLimiter:
         self._linked = linked
         self.holds = self.holds or not linked
         return self._advance(dt_s)
+
+    def _take(self, wanted: Velocity) -> Velocity | None:
+        self._wanted, self._age_s, self._zeros_left = wanted, 0.0, _LAST_ZEROS
+        return self._advance(0.0)
 
     def _advance(self, dt_s: float) -> Velocity | None:
         config, now = self._config, self.velocity

@@ -85,6 +85,10 @@ class RemoteRobot:
         """Command a velocity in m/s and rad/s; a slower one is sent at once, a faster one with the next steps."""
         self._send(self._limiter.command(Velocity(linear_mps, angular_radps)))
 
+    def stand(self) -> None:
+        """Stop, as :class:`~handsteer.robots.Waiting` has it."""
+        self._send(self._limiter.stand())
+
     def step(self, dt_s: float) -> RobotState:
         """Advance time by ``dt_s`` seconds, send what is due, and return the last known state."""
         self._time_s += dt_s
