@@ -52,7 +52,7 @@ from handsteer.robots.description import joints, robot_description, visuals
 from handsteer.robots.editing import edit
 from handsteer.robots.world import load_world, parse_world
 from handsteer.transports.encoding import decode, encode
-from handsteer.types import SIGNS
+from handsteer.types import SIGNS, Velocity
 from tests.fuzz import corpus
 from tests.fuzz.mutants import CASES, hold, mutants
 from tests.plugins.study.plans import a_task
@@ -140,7 +140,9 @@ def test_what_a_page_says_of_pad_sliders_and_camera() -> None:
         assert 0 <= read_number(sent, 0.0, 1.0, 0.5) <= 1
         assert len(read_words(sent)) <= 200
         at = sent.get("at") if isinstance(sent, dict) else sent
-        SteeringInput().keep_sliders(at, 1.0)
+        steering = SteeringInput()
+        steering.slide(Velocity(0.1, 0.0), 0.9)
+        steering.keep_sliders(at, at, 1.0)
 
     hold(read, mutants([*_JSONS, b'{"words": "no camera"}']))
 

@@ -103,9 +103,7 @@ class SteerPanel:
             self._sticks = text("sticks", "").props('role="status"')
         self._show_speed()
         ui.on("pad_held", lambda event: self._hold_pad(event.args))
-        ui.on(
-            "sliders_held", lambda event: self._steer(self._input.keep_sliders(_sent_ms(event.args), time.monotonic()))
-        )
+        ui.on("sliders_held", lambda event: self._keep_sliders(event.args))
         ui.on("let_go", self.release)
         ui.on("sticks", lambda event: self._sticks.set_text(read_words(event.args)))
 
@@ -138,6 +136,11 @@ class SteerPanel:
         wanted = Velocity(y * self._top_mps, -x * self._top_mps * _TURN_PER_SPEED)
         self._steer(self._input.hold_pad(wanted, _sent_ms(sent), time.monotonic()))
 
+    def _keep_sliders(self, sent: object) -> None:
+        touched = sent.get("touched") if isinstance(sent, dict) else None
+        for wanted in self._input.keep_sliders(_sent_ms(sent), touched, time.monotonic()) or (None,):
+            self._steer(wanted)
+
     def _slide(self) -> None:
         wanted = Velocity(self._linear.value, self._angular.value)
         if wanted == self._input.sliders:
@@ -145,8 +148,6 @@ class SteerPanel:
         if wanted.is_zero:
             self.release()
         else:
-            if self._input.sliders.is_zero:
-                self._steer(ZERO)  # they were released until now
             self._input.slide(wanted, time.monotonic())
             self._show_sliders()
 

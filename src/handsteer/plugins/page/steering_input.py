@@ -9,6 +9,7 @@ SLIDERS_TIMEOUT_S = 0.5
 """Sliders return to zero when the page has not reported for this long."""
 
 _LATE_S = 0.2
+_TOUCHED_MS = 500.0
 _LATEST_MS = 1e15  # far in the future; an integer may be too large for any float
 _LATE_IN_A_ROW = 5
 _PAGE = b"page"
@@ -28,6 +29,7 @@ class SteeringInput:
     def __init__(self) -> None:
         self.sliders = ZERO
         self._reported_s = -math.inf
+        self._begins = False
         self._stale = StaleMessageFilter(_LATE_S)
         self._late = 0
 
@@ -44,16 +46,26 @@ class SteeringInput:
     def slide(self, wanted: Velocity, now_s: float) -> None:
         """Set the sliders; the robot follows once the page reports that it is in front."""
         if self.sliders.is_zero:
-            self._reported_s = now_s
+            self._reported_s, self._begins = now_s, True
         self.sliders = wanted
 
-    def keep_sliders(self, sent: object, now_s: float) -> Velocity | None:
-        """Handle a report that the page is in front; return the velocity to steer at, None for none."""
+    def keep_sliders(self, sent: object, touched: object, now_s: float) -> tuple[Velocity, ...]:
+        """Handle a report that the page is in front; return the velocities to steer at, one after the other.
+
+        Sliders that leave zero do so only if they were moved just now, as ``touched`` says, in ms before the report:
+        what a network has held back moves nothing. Then the first velocity is zero: they were released until then.
+        """
         self.end_if_silent(now_s)
-        if not self._is_timely(sent, now_s):
-            return None
+        is_timely = self._is_timely(sent, now_s)
+        begins, self._begins = self._begins, False
+        if begins and not (is_timely and 0.0 <= read_number(touched, -1.0, _LATEST_MS, -1.0) <= _TOUCHED_MS):
+            self.sliders = ZERO
+        if not is_timely:
+            return ()
         self._reported_s = now_s
-        return None if self.sliders.is_zero else self.sliders
+        if self.sliders.is_zero:
+            return ()
+        return (ZERO, self.sliders) if begins else (self.sliders,)
 
     def end_if_silent(self, now_s: float) -> None:
         """Set the sliders to zero if the page has not reported for :data:`SLIDERS_TIMEOUT_S`."""

@@ -46,10 +46,24 @@ function releasePad() {
   say("let_go");
 }
 
+// When the sliders were moved last, by this clock: a movement may reach the server much later, and then counts no more.
+let touching = false;
+let touchedAt = -Infinity;
+const touch = (event) => event.target.closest?.(".sliders") && (touchedAt = Date.now());
+document.addEventListener("pointerdown", (event) => (touching = Boolean(touch(event))), true);
+for (const type of ["pointerup", "pointercancel"]) {
+  document.addEventListener(type, () => {
+    if (touching) touchedAt = Date.now();
+    touching = false;
+  }, true);
+}
+for (const type of ["touchmove", "keydown", "click"]) document.addEventListener(type, touch, true);
+
 // Sliders hold their velocity only while the page is visible.
 const slidersInUse = () => document.querySelector(".sliders.set, .sliders:focus-within") !== null;
 setInterval(() => {
-  if (slidersInUse() && !document.hidden && document.hasFocus()) say("sliders_held");
+  if (!slidersInUse() || document.hidden || !document.hasFocus()) return;
+  say("sliders_held", { touched: touching ? 0 : Math.min(Date.now() - touchedAt, 1e9) });
 }, REPEAT_MS);
 
 function letGo() {
