@@ -4,7 +4,8 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from urllib.parse import urlsplit
 
 import pytest
 from playwright.sync_api import Page
@@ -26,6 +27,7 @@ from handsteer.types import ZERO, Velocity
 from tests.nodes.stepping import Bench
 from tests.plugins.foxglove.viewer import Viewer
 from tests.plugins.page.browsers import a_browser
+from tests.plugins.page.network import Relay
 from tests.plugins.page.visits import NEEDS_A_BROWSER
 from tests.processes import eventually
 
@@ -46,7 +48,12 @@ class Wheel:
     def tap(self, program: str = "A") -> None:
         """Press once and release."""
         self.driving.command(program, AHEAD)
+        self.release(program)
+
+    def release(self, program: str = "A") -> None:
+        """Command nothing for a while, although the program is connected."""
         self.bench.run(HOLD_TIMEOUT_S + 0.1)
+        self.driving.note_silence(program)
 
     def repeat(self, seconds: float, program: str = "A", wanted: Velocity = AHEAD) -> None:
         for _ in range(round(seconds / 0.05)):
@@ -68,7 +75,7 @@ def test_what_a_program_holds_when_it_starts_moves_nothing_before_it_was_release
     wheel = Wheel()
     wheel.repeat(5.0)
     assert not wheel.heard
-    wheel.bench.run(HOLD_TIMEOUT_S + 0.1)
+    wheel.release()
     wheel.repeat(0.5)
     assert wheel.newest() == (0.3, 0.1)
 
@@ -113,8 +120,26 @@ def test_commands_that_a_network_held_back_stop_the_robot(wheel: Wheel) -> None:
         wheel.bench.run(0.01)
     wheel.repeat(2.0)
     assert wheel.newest() == (0.0, 0.0)
-    wheel.bench.run(HOLD_TIMEOUT_S + 0.1)
+    wheel.release()
     wheel.repeat(CONFIRM_S + 0.1)
+    assert wheel.newest() == (0.3, 0.1)
+
+
+@pytest.mark.parametrize("silent_s", [0.35, 0.6, 2.0])
+def test_a_silence_of_the_network_is_no_release(wheel: Wheel, silent_s: float) -> None:
+    wheel.repeat(0.5)
+    wheel.bench.run(silent_s)
+    assert wheel.newest() == (0.0, 0.0)
+    wheel.repeat(2.0)
+    assert wheel.newest() == (0.0, 0.0)
+    wheel.driving.note_silence("A")  # it commands again: that it was silent before does not count any more
+    wheel.repeat(0.5)
+    assert wheel.newest() == (0.0, 0.0)
+    wheel.release("another")
+    wheel.repeat(0.5)
+    assert wheel.newest() == (0.0, 0.0)
+    wheel.release()
+    wheel.repeat(0.5)
     assert wheel.newest() == (0.3, 0.1)
 
 
@@ -281,6 +306,33 @@ def test_what_a_network_held_back_moves_nothing() -> None:
         assert "expected geometry_msgs/Twist" in viewer.said()["message"]
         time.sleep(HOLD_TIMEOUT_S)
         assert graph.robot.path_length_m - before_m < 0.02
+
+
+@pytest.mark.slow
+def test_a_short_stall_of_a_network_is_no_release() -> None:
+    """The program holds its button all the time; what it sends meanwhile comes late, and all at once."""
+    with ExitStack() as opened:
+        graph = opened.enter_context(standing())
+        address = urlsplit(opened.enter_context(served(graph)))
+        relay = opened.enter_context(Relay(address.port or 0))
+        viewer = opened.enter_context(Viewer(address._replace(netloc=f"127.0.0.1:{relay.port}").geturl()))
+        viewer.advertise()
+        tap(lambda: viewer.command(0.2))
+        with repeated(lambda: viewer.command(0.2)):
+            eventually(lambda: speed(graph) > 0.1)
+        relay.freeze()
+        eventually(lambda: stands(graph))
+        for _ in range(3):
+            viewer.command(0.2)
+        time.sleep(2 * HOLD_TIMEOUT_S)
+        relay.thaw()
+        before_m = graph.robot.path_length_m
+        with repeated(lambda: viewer.command(0.2)):
+            time.sleep(1.5)
+            assert graph.robot.path_length_m - before_m < 0.02
+        time.sleep(2 * HOLD_TIMEOUT_S)
+        with repeated(lambda: viewer.command(0.2)):
+            eventually(lambda: speed(graph) > 0.1)
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,8 @@ class Driving:
     """Steers by the commands of the program that has the seat; thread-safe.
 
     A program has to be seen released before it drives: by a zero, or by the end of its commands, as those of Foxglove's
-    panel end. So what it commands first, since the start or after a network held its commands back, moves nothing.
+    panel end, while it is known to be connected (:meth:`note_silence`). So what it commands first, since the start or
+    after a network held its commands back, moves nothing.
 
     Args:
         steering: Publishes the velocity until it is released; not started yet.
@@ -103,7 +104,7 @@ class Driving:
             return False
         with self._lock:
             if program == self._program and now - self._heard_s > HOLD_TIMEOUT_S:
-                self._release()
+                self._lose()
             if program != self._program or is_late:
                 self._begin(program, now, is_late=is_late)
             self._heard_s = now
@@ -112,6 +113,13 @@ class Driving:
             if wanted.is_zero or (self._released == program and now - self._began_s >= CONFIRM_S):
                 self._steering.steer(wanted.linear_mps, wanted.angular_radps)
         return True
+
+    def note_silence(self, program: str) -> None:
+        """Note that ``program`` is connected: if its last command is old, its person has released what steers."""
+        with self._lock:
+            if self._seat.driver == program and self._steering.clock.now() - self._heard_s > HOLD_TIMEOUT_S:
+                self._released, self._program = program, None
+                self._steering.release()
 
     def leave(self, program: str) -> None:
         """Stop if ``program`` steers, and give back its seat."""
@@ -122,12 +130,9 @@ class Driving:
 
     def _watch(self) -> None:
         with self._lock:
-            if self._program is None:
-                return
-            if self._seat.driver != self._program:
+            silent_s = self._steering.clock.now() - self._heard_s
+            if self._program is not None and (silent_s > HOLD_TIMEOUT_S or self._seat.driver != self._program):
                 self._lose()
-            elif self._steering.clock.now() - self._heard_s > HOLD_TIMEOUT_S:
-                self._release()
 
     def _begin(self, program: str, now_s: float, *, is_late: bool) -> None:
         self._program, self._began_s = program, now_s
@@ -136,10 +141,6 @@ class Driving:
             self._steering.lose()
         else:
             self._steering.steer(0.0, 0.0)
-
-    def _release(self) -> None:
-        self._released, self._program = self._program, None
-        self._steering.release()
 
     def _lose(self) -> None:
         self._released = self._program = None

@@ -40,6 +40,7 @@ from handsteer.plugins.foxglove.protocol import (
     server_info,
     status,
 )
+from handsteer.timeouts import HOLD_TIMEOUT_S
 from handsteer.transports.addresses import host_for_others, listen
 from handsteer.transports.base import Transport
 
@@ -47,6 +48,9 @@ _MOST_CLIENTS: Final = 16
 _MOST_CHANNELS: Final = 100
 _REQUEST_PERIOD_S: Final = 0.01
 """A client that sends more often than this waits, so that it cannot take all of this thread."""
+
+_SILENT_S: Final = HOLD_TIMEOUT_S + 0.05
+"""After so long without a command, it has ended, also for the thread that drives."""
 
 _AT_ONCE_S: Final = 0.001
 _MOST_WAITING: Final = 5
@@ -76,14 +80,17 @@ class Client:
 
     Attributes:
         outbox: What waits for it.
+        is_read: Whether all that has come from it is executed.
     """
 
     def __init__(self, name: str, feeds: Feeds, driving: Driving | None) -> None:
         self.outbox = Outbox()
+        self.is_read = False
         self._name = name
         self._feeds = feeds
         self._driving = driving
         self._drives = True
+        self._commanded = asyncio.Event()
         self._channels: dict[int, int] = {}
         self._own: dict[int, ClientChannel] = {}
 
@@ -110,6 +117,22 @@ class Client:
         except LiveError as error:
             self.outbox.reply(status(str(error)))
 
+    async def confirm_silences(self, connection: ServerConnection) -> None:
+        """Whenever its commands end, find out whether it is still connected, so that this is a release.
+
+        A network that holds back commands also holds back the answer to a ping, which comes after them.
+        """
+        while self._driving is not None:
+            await self._commanded.wait()
+            while self._commanded.is_set():
+                self._commanded.clear()
+                await asyncio.sleep(_SILENT_S)
+            await (await connection.ping())
+            while not self.is_read:
+                await asyncio.sleep(_REQUEST_PERIOD_S)
+            if not self._commanded.is_set():
+                self._driving.note_silence(self._name)
+
     def leave(self) -> None:
         """End all its subscriptions, and its driving."""
         for subscription in list(self._channels):
@@ -123,6 +146,7 @@ class Client:
         if channel is None or not channel.has_commands:
             raise LiveError("only commands are taken: geometry_msgs/Twist on /cmd_vel, as JSON or CDR")
         velocity = read_command(published.content, channel.encoding)
+        self._commanded.set()
         drove, self._drives = self._drives, self._driving.command(self._name, velocity, is_late=is_late)
         if drove and not self._drives:
             self.outbox.reply(status("another one drives the robot, and has been asked to hand over"))
@@ -252,21 +276,32 @@ class LiveServer:
         self._clients.add(client)
         client.outbox.reply(server_info(self._session, takes_commands=self._driving is not None))
         client.outbox.reply(advertise(feeds.channels))
-        sending = asyncio.create_task(_send(connection, client.outbox))
+        tasks = [
+            asyncio.create_task(_send(connection, client.outbox)),
+            asyncio.create_task(_confirm(client, connection)),
+        ]
         try:
             waiting = 0
             while True:
                 asked_s = time.monotonic()
+                client.is_read = True
                 data = await connection.recv()
+                client.is_read = False
                 waiting = waiting + 1 if time.monotonic() - asked_s < _AT_ONCE_S else 0
                 client.obey(data, is_late=waiting > _MOST_WAITING)
                 await asyncio.sleep(_REQUEST_PERIOD_S)
         except ConnectionClosed:
             pass
         finally:
-            sending.cancel()
+            for task in tasks:
+                task.cancel()
             client.leave()
             self._clients.discard(client)
+
+
+async def _confirm(client: Client, connection: ServerConnection) -> None:
+    with contextlib.suppress(ConnectionClosed):
+        await client.confirm_silences(connection)
 
 
 async def _send(connection: ServerConnection, outbox: Outbox) -> None:
