@@ -92,7 +92,7 @@ class Teleop:
 
     def hold_back(self, velocity: Velocity) -> None:
         """Continue from ``velocity``: the slower one that was commanded instead of what :meth:`step` returned."""
-        self._control.mux.hold_back(velocity)
+        self._control.hold_back(velocity)
 
     def stop(self) -> None:
         """Stop until :meth:`reset`; signs are ignored."""

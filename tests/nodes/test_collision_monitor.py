@@ -13,6 +13,7 @@ from handsteer.messages import (
     HAND_SIGN,
     ODOM,
     SCAN,
+    STEERING_CMD_VEL,
     Header,
     LaserScan,
     Odometry,
@@ -131,6 +132,23 @@ def test_a_slowed_robot_goes_on_as_slowly_until_it_is_told_to_be_faster() -> Non
     slow, _ = bench.command
     bench.show("Go", 5, ahead(7.0))
     assert bench.command == (about(slow, abs=0.01), 0.0)
+
+
+def test_after_an_obstacle_it_speeds_up_within_the_limit_of_acceleration() -> None:
+    bench = MonitorBench(control=ControlConfig(max_linear_acceleration=0.3))
+    steering = bench.transport.advertise("pad", STEERING_CMD_VEL)
+
+    def steer(linear_mps: float, metres: float, seconds: float) -> None:
+        for _ in range(round(seconds * 30)):
+            bench.scan(ahead(metres))
+            steering.publish(twist(linear_mps, 0.0))
+            bench.run(1 / 30)
+
+    steer(0.0, 7.0, 0.3)
+    steer(1.0, 0.4, 6.0)
+    assert bench.command == (0.0, 0.0)
+    steer(1.0, 7.0, 0.5)
+    assert 0.0 < bench.command[0] < 0.2
 
 
 def test_a_scan_that_stops_coming_stops_the_robot() -> None:

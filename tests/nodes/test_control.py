@@ -946,6 +946,60 @@ def test_a_gesture_that_is_old_or_was_made_before_engages_nothing() -> None:
     assert bench.control._report().engaged
 
 
+def test_an_old_message_makes_no_old_gesture_new() -> None:
+    bench = ControlBench(engage=True)
+    bench.make_gesture()
+    bench.stop.publish(Bool(data=True))
+    bench.run(0.1)
+    bench.stop.publish(Bool(data=False))
+    bench.run(0.1)
+    bench.joys.publish(joy_of(RELEASED, HEADER, engages=True), bench.clock.now() - 0.5)
+    bench.run(0.01)
+    bench.make_gesture(is_new=False)
+    assert not bench.control._safety.engagement.engaged
+
+
+@pytest.mark.parametrize("ahead_s", [0.0, 1000.0])
+def test_a_hand_whose_stamp_does_not_advance_is_one_message(ahead_s: float) -> None:
+    bench = ControlBench(ControlConfig(mode="joystick"))
+    stamped_s = bench.clock.now() + ahead_s
+    header = replace(HEADER, stamp=bench.clock.stamp(stamped_s))
+    bench.hold(RELEASED)
+    for _ in range(60):
+        bench.joys.publish(joy_of(AHEAD, header), stamped_s)
+        bench.run(1 / 30)
+    assert bench.last() == (0, 0)
+
+
+def test_a_sign_whose_action_changes_while_it_is_shown_starts_nothing() -> None:
+    bench = ControlBench(ControlConfig(actions={"Peace": "stop"}), arming=True)
+    bench.show(*["Peace"] * 60)
+    bench.control.reconfigure(Config(control=ControlConfig(actions={"Peace": "forward"})))
+    bench.show(*["Peace"] * 60)
+    assert set(bench.commands) == {(0, 0)}
+    bench.show(*["Stop"] * 30, *["Peace"] * 30)
+    assert bench.last()[0] > 0
+
+
+def test_where_no_signs_come_the_finger_points_nowhere() -> None:
+    bench = ControlBench(ControlConfig(rule="point"))
+
+    def point(sign: str, stick: Stick) -> None:
+        if sign:
+            bench.signs.publish(String(data=sign), bench.clock.now())
+        bench.joys.publish(joy_of(RELEASED, HEADER, pointing=stick), bench.clock.now())
+        bench.run(1 / 30)
+
+    for _ in range(30):
+        point("NONE", RELEASED)
+    for _ in range(30):
+        point("Forward", AHEAD)
+    assert bench.last()[0] > 0
+    for _ in range(30):
+        point("", AHEAD)
+    assert bench.last() == (0, 0)
+
+
 def test_a_gesture_while_it_is_stopped_engages_nothing() -> None:
     bench = ControlBench(engage=True)
     bench.stop.publish(Bool(data=True))

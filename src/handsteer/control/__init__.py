@@ -45,6 +45,7 @@ class Control:
         self.mux = TwistMux(config)
         self._ramp = Ramp(config)
         self._since_command_s = 0.0
+        self._since_sign_s = 0.0
         self._stop_is_shown = True
 
     def step(
@@ -75,6 +76,7 @@ class Control:
             return self.halt()
         self.safety.step(dt_s)
         self._since_command_s += dt_s
+        self._since_sign_s += dt_s
         if self._config.points:
             stick = self._agreeing(sign, stick)
         self._note(sign, steering, by, stick)
@@ -162,10 +164,10 @@ class Control:
     def reconfigure(self, config: ControlConfig) -> Velocity | None:
         """Change limits, steps and times; return the velocity to command now if the last one exceeds the new limits.
 
-        Another mode or rule stops the robot, and the hand must show neutral first.
+        Another mode or rule, or other actions, stop the robot, and the hand must show neutral first.
         """
         stopped: Velocity | None = None
-        if (config.mode, config.rule) != (self._config.mode, self._config.rule):
+        if _way_to_drive(config) != _way_to_drive(self._config):
             self.safety.disarm("its rule has changed")
             stopped = self.halt()
         self._config = config
@@ -174,9 +176,20 @@ class Control:
         velocity = self._ramped(self.mux.reconfigure(config))
         return stopped if velocity is None else velocity
 
+    def hold_back(self, velocity: Velocity) -> None:
+        """Continue from ``velocity``, a slower one that was commanded instead of the last."""
+        self.mux.hold_back(velocity)
+        self._ramp.hold_back(velocity)
+
     def _agreeing(self, sign: str | None, stick: Stick | None) -> Stick | None:
-        """Return the stick that counts: released, at once, by a sign that stops, whatever it says until another one."""
+        """Return the stick that counts: released, at once, by a sign that stops, whatever it says until another one.
+
+        So it is where no signs come.
+        """
+        if sign is None and self._since_sign_s >= self._config.sign_timeout:
+            self._stop_is_shown = True
         if sign is not None:
+            self._since_sign_s = 0.0
             self._stop_is_shown = action_of(sign, self._config.actions) == "stop"
             self.mux.note_shown(sign)
         is_asked = sign is not None or stick is not None
@@ -195,6 +208,10 @@ class Control:
             return None
         since_s, self._since_command_s = self._since_command_s, 0.0
         return self._ramp.step(velocity, min(since_s, self._config.sign_timeout))
+
+
+def _way_to_drive(config: ControlConfig) -> tuple[object, ...]:
+    return config.mode, config.rule, config.actions
 
 
 class TwistMux:

@@ -273,6 +273,11 @@ class Ramp:
         """Change the limits."""
         self._config = config
 
+    def hold_back(self, velocity: Velocity) -> None:
+        """Continue from ``velocity``, a slower one that was commanded instead of the last."""
+        self._linear.hold_back(velocity.linear_mps)
+        self._angular.hold_back(velocity.angular_radps)
+
     def step(self, wanted: Velocity, dt_s: float) -> Velocity:
         """Return the velocity to command ``dt_s`` seconds after the last step."""
         config = self._config
@@ -286,6 +291,10 @@ class _Axis:
     def __init__(self) -> None:
         self._now = 0.0
         self._acceleration = 0.0
+
+    def hold_back(self, now: float) -> None:
+        if abs(now) < abs(self._now):
+            self._now, self._acceleration = now, 0.0
 
     def step(self, wanted: float, dt_s: float, max_acceleration: float, max_jerk: float) -> float:
         if not (max_acceleration or max_jerk):

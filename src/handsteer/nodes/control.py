@@ -110,13 +110,13 @@ class HandSignControlNode(Node):
         self._control = Control(config, arming=arming, engage=engage, renew=renew)
         self._safety, self._mux = self._control.safety, self._control.mux
         self._following = None if config.robots else Following(checks_motion=arming)
-        self._measured, self._repeats = MeasuredVelocity(), Repeats()
+        self._measured, self._repeats, self._hand_repeats = MeasuredVelocity(), Repeats(), Repeats()
         self._moved: tuple[float, bool] | None = None
         self._commanded = ZERO
         self._last_step_s = clock.now()
         self._camera_since_s = -math.inf
         rule = collision_monitor or CollisionMonitorConfig()
-        self._monitor = CollisionMonitor(self, config, rule, self._mux.hold_back, scan=scan, odom=odom)
+        self._monitor = CollisionMonitor(self, config, rule, self._control.hold_back, scan=scan, odom=odom)
         self._stall_guard = StallGuard(config.sign_timeout, clock.now())
         self._last_sign = NONE
         self._selection = (
@@ -224,10 +224,13 @@ class HandSignControlNode(Node):
 
     def _on_stick(self, received: Received[Joy]) -> None:
         """Note whether the hand engages; follow it if it drives as a joystick or by pointing."""
-        is_old = self._is_stale(received) or self._waits_for_others()
-        self._control.note_gesture(is_done=engages_in(received.message) and not is_old)
+        if not (self._is_stale(received) or self._waits_for_others()):
+            self._control.note_gesture(is_done=engages_in(received.message))
+        is_again = self._hand_repeats.has(received.message.header.stamp, self.clock.now())
         if self._config.by_stick:
             stick = (stick_in if self._config.mode == "joystick" else pointing_in)(received.message)
+            if is_again and stick.held:
+                return  # it says nothing of now
             self._take(received.captured_s, is_late=self._is_stale(received), is_stop=not stick.held, stick=stick)
 
     def _on_gamepad(self, stick: Stick, received: Received[Joy], *, is_at_rest: bool) -> None:

@@ -88,7 +88,7 @@ class _Page:
 
     def hold_back(self, velocity: Velocity) -> None:
         """Continue from ``velocity``."""
-        self._control.mux.hold_back(velocity)
+        self._control.hold_back(velocity)
 
     def _move(self) -> Velocity | None:
         """Advance the hand by one tick; return the velocity it holds, None if it holds none."""
