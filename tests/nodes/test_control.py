@@ -770,7 +770,7 @@ def test_a_joystick_from_a_stale_frame_moves_nothing_but_stops() -> None:
     ("axes", "buttons"),
     [([], []), ([0.0, 1.0], []), ([0.0], [1]), ([math.nan, 1.0], [1]), ([0.0, math.inf], [1])],
 )
-def test_an_incomplete_joystick_is_a_released_one(axes: list[float], buttons: list[int]) -> None:
+def test_an_incomplete_joystick_stops_the_robot(axes: list[float], buttons: list[int]) -> None:
     bench = ControlBench(JOYSTICK)
     bench.hold(RELEASED, AHEAD)
     bench.joys.publish(Joy(HEADER, np.array(axes, np.float32), np.array(buttons, np.int32)), bench.clock.now())
