@@ -51,6 +51,8 @@ def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
         ("robto: {}", r"robto: there is no such parameter"),
         ("camera: {fps: .nan}", r"camera.fps: nan should be a finite number"),
         ("camera: {fps: fast}", r"camera.fps: 'fast' should be a valid number"),
+        ("control: {max_linear: yes}", r"control.max_linear: True should be a number, not true or false"),
+        ("joystick: {dead_zone: off}", r"joystick.dead_zone: False should be a number, not true or false"),
         ("control: {ramp: quickly}", r"control.ramp: 'quickly' should be 'per_message' or 'per_second'"),
         ("control: 3", r"control: 3 should be"),
         ("control: {actions: {Hi: fly}}", r"control.actions.Hi: 'fly' should be 'forward', .* or 'next_robot'"),

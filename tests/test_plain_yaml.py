@@ -25,6 +25,9 @@ REFUSED = (
     ("a: !!python/object/apply:os.system [x]", "the tag 'tag:yaml.org,2002:python/object/"),
     ("!!set {a}", "the tag 'tag:yaml.org,2002:set'"),
     ("a: !<" + "x" * 5000 + "> 1", "is not read here"),
+    ("control:\n  mode: signs\ncontrol:\n  ramp: per_second\n", r"^w\.yaml, line 3: 'control' is given twice$"),
+    ("a: [1, {b: 1, c: [2, {b: 3}], b: 2}]", r"line 1: 'b' is given twice$"),
+    ("'a': 1\n\"a\": 2", r"line 2: 'a' is given twice$"),
     ("a: {", r"^w\.yaml, line 1: not valid YAML$"),
     ("? [1]\n: 2", "line 1: not valid YAML"),
     ("a:\n\tb: 1", "line 2: not valid YAML: indent with spaces, not with a tab$"),
@@ -50,6 +53,7 @@ def test_refuses_in_one_short_line(text: str | bytes, words: str) -> None:
     [
         ("", None),
         ("a: [1, 0.5, true, text, null, 1e400, .inf]", {"a": [1, 0.5, True, "text", None, "1e400", float("inf")]}),
+        ("a: {b: a}\nb: [{a: 1}, {a: a}]\nc: a", {"a": {"b": "a"}, "b": [{"a": 1}, {"a": "a"}], "c": "a"}),
         ("a: 2001-99-99", {"a": "2001-99-99"}),
         ("a: !!float 3", {"a": 3.0}),
         ("a: !!str 3", {"a": "3"}),

@@ -137,20 +137,40 @@ def _begins_with_tab(text: str | bytes, line: int | None) -> bool:
 
 
 def _look_through(text: str | bytes) -> None:
-    depth = 0
+    around: list[_Table | None] = []  # None for a list
     for count, event in enumerate(_events(text)):
         if count > MOST_VALUES:
             raise _ProblemError(f"more than {MOST_VALUES} values", event.start_mark)
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-            if depth > DEEPEST:
-                raise _ProblemError(f"lists and tables are nested more than {DEEPEST} deep", event.start_mark)
-            if event.tag not in (None, "!", *_COLLECTIONS):
-                raise _unknown_tag(event)
-        elif isinstance(event, yaml.ScalarEvent):
+        if isinstance(event, yaml.CollectionEndEvent):
+            around.pop()
+            continue
+        if around and (table := around[-1]):
+            table.note(event)
+        if isinstance(event, yaml.ScalarEvent):
             _check_scalar(event)
-        else:
-            depth -= 1
+            continue
+        if len(around) == DEEPEST:
+            raise _ProblemError(f"lists and tables are nested more than {DEEPEST} deep", event.start_mark)
+        if event.tag not in (None, "!", *_COLLECTIONS):
+            raise _unknown_tag(event)
+        around.append(_Table() if isinstance(event, yaml.MappingStartEvent) else None)
+
+
+class _Table:
+    """The keys of a table: of two that are the same, the parser would keep the last, and lose the other."""
+
+    def __init__(self) -> None:
+        self._keys: set[str] = set()
+        self._is_value = False
+
+    def note(self, event: Any) -> None:
+        """Note the beginning of the next key or value."""
+        is_value, self._is_value = self._is_value, not self._is_value
+        if is_value or not isinstance(event, yaml.ScalarEvent):
+            return
+        if event.value in self._keys:
+            raise _ProblemError(f"{quoted(event.value)} is given twice", event.start_mark)
+        self._keys.add(event.value)
 
 
 def _events(text: str | bytes) -> Iterator[Any]:

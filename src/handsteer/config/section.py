@@ -3,9 +3,18 @@
 import logging
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final
+from typing import Annotated, Any, ClassVar, Final, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    JsonValue,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 log = logging.getLogger(__name__)
 
@@ -16,8 +25,22 @@ _LIVE: Final[dict[str, JsonValue]] = {"live": True}
 _OLD_NAMES_SEEN: set[str] = set()
 
 
-class Section(BaseModel):
-    """A group of parameters; unknown names and values out of range are rejected.
+class Values(BaseModel):
+    """Named values; unknown names and values out of range are rejected."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
+
+    @field_validator("*")
+    @classmethod
+    def without_null(cls, value: Any) -> Any:
+        """Return ``value``; no system call takes a text with a null character as a name, path or address."""
+        if isinstance(value, str | Path) and "\0" in str(value):
+            raise ValueError("must have no null character")
+        return value
+
+
+class Section(Values):
+    """A group of parameters.
 
     Attributes:
         live: Those that can change while a node runs; the others are read at start-up.
@@ -26,7 +49,6 @@ class Section(BaseModel):
 
     live: ClassVar[frozenset[str]] = frozenset()
     renamed: ClassVar[Mapping[str, str]] = {}
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
 
     @classmethod
     def new_name(cls, name: str) -> str:
@@ -37,12 +59,15 @@ class Section(BaseModel):
             log.warning("parameter %s is deprecated: use %s", name, new)
         return new
 
-    @field_validator("*")
+    @field_validator("*", mode="before")
     @classmethod
-    def without_null(cls, value: Any) -> Any:
-        """Return ``value``; no system call takes a text with a null character as a name, path or address."""
-        if isinstance(value, str | Path) and "\0" in str(value):
-            raise ValueError("must have no null character")
+    def no_boolean_for_a_number(cls, value: Any, field: ValidationInfo) -> Any:
+        """Return ``value``; YAML reads on, off, yes and no as booleans, which would count as 1 and 0."""
+        if isinstance(value, bool) and field.field_name:
+            kind = cls.model_fields[field.field_name].annotation
+            kinds = {kind, *get_args(kind)}
+            if kinds & {int, float} and bool not in kinds:
+                raise ValueError("should be a number, not true or false")
         return value
 
     @model_validator(mode="before")

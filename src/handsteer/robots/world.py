@@ -23,6 +23,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from handsteer import plain_yaml
 from handsteer.config import Section
+from handsteer.config.section import Values
 from handsteer.errors import WorldError, as_name, did_you_mean, quoted
 from handsteer.robots import Shape
 
@@ -44,7 +45,7 @@ class Floor(Section):
     colour: Colour = Field("#c8ccd4", description="As on web pages: #rrggbb")
 
 
-class _Thing(Section):
+class _Thing(Values):
     """Fields of all obstacles, which stand on the floor."""
 
     name: str = Field(min_length=1, max_length=60, description="What it is called when the robot touches it")
