@@ -10,6 +10,7 @@ import pytest
 
 from handsteer.cli.app import _ros_words_last, add_plugin_verbs, app
 from handsteer.cli.options import take_parameters
+from handsteer.errors import ConfigError
 from tests.cli.test_cli import fails, prints
 
 VERBS = [
@@ -95,6 +96,14 @@ def test_parameters_are_options_of_every_form(capsys: pytest.CaptureFixture[str]
     assert found["robot"] == {"publish_clock": True}
     assert found["dashboard"] == {"open_browser": False}
     assert found["collision_monitor"] == {"scan_x": "-0.5"}
+    words = ["--robot.publish-clock", "FALSE", "--foxglove.drive", "true", "--dashboard.open-browser=false", "true"]
+    own, found = take_parameters(words)
+    assert own == ["true"]
+    assert found["robot"] == {"publish_clock": "FALSE"}
+    assert (found["foxglove"], found["dashboard"]) == ({"drive": "true"}, {"open_browser": "false"})
+    for words in (["--foxglove.no-drive=true"], ["--foxglove.no-drive", "false"]):
+        with pytest.raises(ConfigError, match=r"--foxglove\.no-drive takes no value: it sets drive to false"):
+            take_parameters(words)
     assert take_parameters(["--control.robots", "r1", "--control.robots=r2"])[1] == {
         "control": {"robots": ["r1", "r2"]}
     }

@@ -22,9 +22,10 @@ _NUMBER = re.compile(r"-[\d.].*")
 def take_parameters(words: list[str]) -> tuple[list[str], dict[str, Any]]:
     """Return ``words`` without the options of parameters, and these parameters by section.
 
-    A boolean one is an option without a value, as ``--robot.publish-clock``; ``--robot.no-publish-clock`` is false. A
-    list's option is repeated, and an entry of a table has a further part: ``--control.actions.Peace turbo``. What
-    follows ``--`` is not read. The values are texts, which are not checked here.
+    A boolean one may have the value true or false; ``--robot.publish-clock`` alone is true, and
+    ``--robot.no-publish-clock`` false. A list's option is repeated, and an entry of a table has a further part:
+    ``--control.actions.Peace turbo``. What follows ``--`` is not read. The values are texts, which are not checked
+    here.
 
     Raises:
         ConfigError: There is no such parameter, or its value is missing or given twice.
@@ -68,6 +69,10 @@ def _take(section: str, given: str, value: str | None, rest: list[str], found: d
         raise ConfigError(f"there is no option {option}{_near(section, given, model)}")
     values = found.setdefault(section, {})
     if is_flag:
+        if value is None and rest and rest[0].lower() in ("true", "false"):
+            value = rest.pop(0)
+        if value is not None and name != positive:
+            raise ConfigError(f"{option} takes no value: it sets {positive} to false")
         _put(values, positive, name == positive if value is None else value, option)
         return
     if value is None:
