@@ -261,6 +261,39 @@ def test_what_cannot_be_loaded_is_reported_with_its_distribution(installed: Inst
         doors.ROBOTS.load("broken")
 
 
+@pytest.mark.parametrize(
+    ("group", "words", "said"),
+    [
+        ("cameras", ("--camera", "mine"), "the camera mine of broken cannot be opened: RuntimeError: no device"),
+        ("robots", ("--robot", "mine"), "the robot mine of broken cannot be opened: RuntimeError: no device"),
+        (
+            "classifiers",
+            ("--signs.classifier", "mine"),
+            "the classifier mine of broken cannot be opened: RuntimeError:",
+        ),
+    ],
+)
+def test_what_cannot_be_opened_is_reported_with_its_distribution(
+    installed: Installed, group: str, words: tuple[str, ...], said: str
+) -> None:
+    installed.add("broken", "def make(*given):\n    raise RuntimeError('no device')\n", **{group: "mine = make"})
+    camera = () if group == "cameras" else ("--camera", "virtual")
+    error = installed.run("run", "--headless", "--duration", "1", *camera, *words, code=2).stderr
+    assert said in error
+    assert "Traceback" not in error
+
+
+@pytest.mark.slow
+def test_parameters_may_be_in_the_module_of_a_verb_or_transport(installed: Installed) -> None:
+    code = example("Parameters") + example("Verb").replace("from __future__ import annotations\n", "")
+    installed.add("lamp", code, parameters="lamp = Lamp", verbs="greet = greet")
+    assert "left out" not in installed.run("greet").stderr
+    installed.add(
+        "torch", example("Parameters") + example("Transport"), parameters="torch = Lamp", transports="t = Alone"
+    )
+    assert "--torch.brightness" in installed.run("parameters", "torch").stdout
+
+
 def test_an_unknown_name_gets_the_nearest(installed: Installed) -> None:
     installed.add("scale", example("Robot"), robots="scale = Scale")
     with pytest.raises(PluginError, match=r"^there is no robot 'scal': did you mean scale\? installed are sim, scale$"):

@@ -13,9 +13,9 @@ import importlib.metadata
 import logging
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, ParamSpec, Protocol, TypeVar
 
-from handsteer.errors import PluginError, did_you_mean
+from handsteer.errors import HandsteerError, PluginError, did_you_mean
 
 if TYPE_CHECKING:
     from handsteer.cameras import Camera
@@ -33,6 +33,8 @@ log = logging.getLogger(__name__)
 _OURS: Final = "handsteer"
 
 T = TypeVar("T")
+Made = TypeVar("Made")
+P = ParamSpec("P")
 
 
 class SignAction(Protocol):
@@ -106,10 +108,31 @@ class Door(Generic[T]):
         try:
             found: T = entry.load()
         except Exception as error:  # whatever the code of others raises while it is imported
-            package = entry.dist.name if entry.dist else "an unknown distribution"
-            reason = f"{type(error).__name__}: {error}"
-            raise PluginError(f"the {self._what} {name} of {package} cannot be loaded: {reason}") from error
+            raise self._failed(name, "loaded", error) from error
         return found
+
+    def open(self: "Door[Callable[P, Made]]", name: str, *arguments: P.args, **options: P.kwargs) -> "Made":
+        """Return what the function of this name makes of its arguments.
+
+        Raises:
+            PluginError: There is none, or it cannot be loaded or opened.
+            HandsteerError: It says itself, by one, why it cannot be opened.
+        """
+        make = self.load(name)
+        try:
+            return make(*arguments, **options)
+        except HandsteerError:
+            raise
+        except Exception as error:
+            dist = self._entry(name).dist
+            if dist is not None and dist.name == _OURS:
+                raise
+            raise self._failed(name, "opened", error) from error
+
+    def _failed(self, name: str, done: str, error: Exception) -> PluginError:
+        entry = self._entry(name)
+        package = entry.dist.name if entry.dist else "an unknown distribution"
+        return PluginError(f"the {self._what} {name} of {package} cannot be {done}: {type(error).__name__}: {error}")
 
     def _entry(self, name: str) -> importlib.metadata.EntryPoint:
         entries = _entries(self.group)

@@ -175,7 +175,7 @@ def open_robot(config: Config, clock: Clock, link: Session | None = None, cmd_ve
     """
     kind = config.robot.kind
     if kind in doors.ROBOTS.names():
-        return doors.ROBOTS.load(kind)(config, clock)
+        return doors.ROBOTS.open(kind, config, clock)
     if link is None:
         raise ConfigError(f"robot.kind is {kind}: only `handsteer run` drives a real robot; here it is sim")
     from handsteer.robots.remote import RemoteRobot

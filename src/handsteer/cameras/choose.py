@@ -38,16 +38,16 @@ def open_camera(config: Config, clock: Clock) -> Camera:
     """
     source = config.camera.source
     if source == "auto":
-        return _first_webcam(config.camera, clock) or doors.CAMERAS.load(_VIRTUAL.source)(config, clock)
+        return _first_webcam(config.camera, clock) or doors.CAMERAS.open(_VIRTUAL.source, config, clock)
     if source == "browser":
         raise CameraNotFound("the browser's camera needs the page: handsteer run --camera browser")
     if source in doors.CAMERAS.names():
-        return doors.CAMERAS.load(source)(config, clock)
+        return doors.CAMERAS.open(source, config, clock)
     if is_device(source) or is_address(source):
         return _webcam(source, config.camera, clock)
     path = Path(source).expanduser()
     if is_recording(path) and path.exists():
-        return doors.CAMERAS.load(_RECORDED)(config, clock)
+        return doors.CAMERAS.open(_RECORDED, config, clock)
     return _file(path, config.camera, clock)
 
 

@@ -81,6 +81,7 @@ _NOT_A_NUMBER = re.compile(r"Invalid value for (\S+): unable to convert (.*) int
 _GRAPH = "One node of a graph of several processes"
 _NODES = ("camera", "recognition", "control", "robot", "steering")
 _LOADS: dict[object, tuple[str, ...]] = {}
+_OF_OTHERS: set[str] = set()
 
 app = App(
     name="handsteer",
@@ -111,6 +112,8 @@ def add_plugin_verbs() -> None:
         of_function = {} if target.endswith(":app") else {"help_epilogue": ""}
         if verb not in known:
             app.command(target, name=verb, **of_function)
+            if not target.startswith("handsteer."):
+                _OF_OTHERS.add(verb)
 
 
 def loads(*modules: str) -> Callable[[V], V]:
@@ -129,6 +132,9 @@ def run(words: list[str]) -> int:
     # To search what is installed takes a tenth of the time to load this.
     if not words or words[0] not in set(app) - set(app.help_flags):
         add_plugin_verbs()
+    if words and words[0] in _OF_OTHERS:
+        # It looks for parameters of plug-ins, which may be in the module of a verb: that must not be half loaded then.
+        importlib.import_module("handsteer.config")
     _load_what_help_lists(app, words)
     return exit_code(lambda: _run(words))
 

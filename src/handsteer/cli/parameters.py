@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from handsteer.parameters import Description
 
 
-@loads("handsteer.parameters")
+@loads("handsteer.config", "handsteer.parameters")
 def parameters(name: str | None = None, /, *, json: Flag = False) -> int:
     """List the parameters: each is an option, such as --control.max-linear 0.5, and a line in a --config file.
 

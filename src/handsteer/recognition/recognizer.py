@@ -48,7 +48,7 @@ def open_classifier(config: SignsConfig) -> Classifier:
         PluginError: The classifier is a plug-in that cannot be loaded.
     """
     if config.classifier != "shipped":
-        known = doors.CLASSIFIERS.load(config.classifier)(config)
+        known = doors.CLASSIFIERS.open(config.classifier, config)
     else:
         shipped = ShippedClassifier(load_model())
         profile = load_profile(profile_path(config.profile)) if config.profile else None

@@ -40,7 +40,7 @@ def join(transport: str, node: str, arguments: Sequence[str]) -> Session:
     if transport not in known:
         near = did_you_mean(transport, known)
         raise TransportError(f"there is no transport {transport!r}{near or ':'} use {' or '.join(known)}")
-    return doors.TRANSPORTS.load(_found() if transport == AUTO else transport)(node, arguments)
+    return doors.TRANSPORTS.open(_found() if transport == AUTO else transport, node, arguments)
 
 
 def _found() -> str:
