@@ -1,6 +1,8 @@
 """Shared by the verbs: logging, settings, messages, tables and exit codes."""
 
+import errno
 import gc
+import io
 import logging
 import os
 import signal
@@ -17,8 +19,13 @@ if TYPE_CHECKING:
     from handsteer.config import Config
 
 
+_NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
+
+
 def set_up_logging() -> None:
-    """Log to standard error; from libraries, warnings only."""
+    """Log to standard error; from libraries, warnings only. What standard output cannot show becomes ``?``."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
     logging.basicConfig(level=logging.INFO, format="handsteer: %(message)s", stream=sys.stderr)
     for noisy in ("uvicorn", "asyncio", "httpx", "watchfiles", "rospy"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
@@ -27,12 +34,24 @@ def set_up_logging() -> None:
 def exit_code(call: Callable[[], int | None]) -> int:
     """Return the exit code of ``call``; 2, with a message, if the input was wrong."""
     try:
-        return call() or 0
+        code = call() or 0
+        if sys.stdout is not None:
+            sys.stdout.flush()  # what cannot be written is found now
+        return code
     except HandsteerError as error:
         return fail(str(error))
     except BrokenPipeError:  # the reader of the output has ended, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()
         return 0
+    except OSError as error:
+        if error.errno not in _NO_SPACE:
+            raise
+        _discard_output()
+        return fail(f"cannot write the output: {error.strerror}")
+
+
+def _discard_output() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def fail(message: str) -> int:
@@ -72,11 +91,19 @@ def default_file() -> Path | None:
     return DEFAULT_FILE
 
 
-def check_writable(option: str, path: Path, error: type[HandsteerError]) -> None:
+def check_writable(
+    option: str, path: Path, error: type[HandsteerError], replaces: Callable[[Path], object] | None = None
+) -> None:
     """Check that the file ``path``, which ``option`` names, can be written, before the work rather than after it.
 
+    Args:
+        option: For messages.
+        path: The file.
+        error: Type of the error raised.
+        replaces: Reads a file of the kind that is written; one that it cannot read is not replaced.
+
     Raises:
-        HandsteerError: It cannot; of the given type.
+        HandsteerError: It cannot, or it exists and is another kind of file; of the given type.
     """
     folder = path.absolute().parent
     if not folder.is_dir():
@@ -88,6 +115,12 @@ def check_writable(option: str, path: Path, error: type[HandsteerError]) -> None
             pass
     except OSError as problem:
         raise error(f"{option}: cannot write {path}: {problem.strerror}") from None
+    if replaces is None or not path.exists():
+        return
+    try:
+        replaces(path)
+    except (HandsteerError, OSError, ValueError):
+        raise error(f"{option}: {path} exists, and is not such a file: give another name, or move it away") from None
 
 
 def printable(line: str) -> str:

@@ -61,6 +61,8 @@ class NpzFormat:
         arrays = self._arrays(path, most_bytes)
         try:
             return build(arrays)
+        except KeyError as error:
+            raise self.corrupt(f"{path}: not a {self.what}: it has no {error.args[0]}; {self.remedy}") from None
         except Exception as error:
             reason = str(error)[:_LONGEST_REASON]
             raise self.corrupt(f"{path}: a damaged {self.what} ({reason}); {self.remedy}") from None

@@ -96,6 +96,7 @@ def test_the_default_is_short_and_all_is_more(monkeypatch: pytest.MonkeyPatch) -
         (("--latency", "-1"), "latency in ms: -1 should be from 0 to 5000"),
         (("--sweep", "speed=1"), "factors: latency, fps, errors, reaction"),
         (("--json", "/nowhere/laps.json"), "there is no folder /nowhere"),
+        (("--json", "README.md"), "--json: README.md exists, and is not such a file: give another name, or move it"),
     ],
 )
 def test_wrong_options_end_with_code_2(

@@ -138,7 +138,7 @@ def bench(
     with needing("the simulated robot", "sim", "mujoco", "xacro"):
         from handsteer.plugins.bench.laps import INTERFACES
     if json is not None:
-        check_writable("--json", json, BenchError)
+        check_writable("--json", json, BenchError, _read_json)
     drawing = _open_plots(plots)
     from handsteer.config import assist_of
     from handsteer.plugins.bench.courses import COURSES
@@ -249,6 +249,11 @@ def _open_plots(folder: Path | None) -> ModuleType | None:
     except OSError as error:
         raise BenchError(f"--plots: cannot make the folder {folder}: {error.strerror}") from None
     return plots
+
+
+def _read_json(path: Path) -> object:
+    with path.open(encoding="utf-8") as file:
+        return json_format.load(file)
 
 
 def _write(path: Path, text: str) -> None:

@@ -66,6 +66,8 @@ def test_the_camera_asks_for_each_sign_and_says_which_was_not_shown(capsys: pyte
         (["--seconds", "nan"], "--seconds: nan should be from 0.2 to 30"),
         (["--countdown", "31"], "--countdown: 31 should be from 0 to 30 seconds"),
         (["--out", "nowhere/me.npz"], "--out: there is no folder"),
+        (["--out", "empty.npz"], "--out: empty.npz exists, and is not such a file: give another name, or move it away"),
+        (["--from", "empty.npz", "--camera", "virtual"], "give either --from or --camera"),
         (["--from", "empty.npz"], "empty.npz: none of its hands shows one of Stop, Forward"),
         (["--from", "nowhere"], "there is no folder nowhere"),
     ],
@@ -73,6 +75,14 @@ def test_the_camera_asks_for_each_sign_and_says_which_was_not_shown(capsys: pyte
 def test_wrong_options(capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:
     save_dataset(Dataset(), Path("empty.npz"))
     assert message in fails(capsys, "signs", "calibrate", *arguments)
+
+
+def test_a_folder_of_profiles_that_cannot_be_made_ends_before_signs_are_asked_for(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", "/proc")
+    said = fails(capsys, "signs", "calibrate", "--camera", "virtual")
+    assert said.startswith("cannot make the folder of profiles /proc/handsteer/profiles: ")
 
 
 def test_a_profile_that_is_missing_ends_the_start(capsys: pytest.CaptureFixture[str]) -> None:

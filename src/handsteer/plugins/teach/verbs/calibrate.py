@@ -87,12 +87,18 @@ def calibrate(
         YAML file with parameters, each of which is an option too: `handsteer parameters`. Options override the file.
     """
     from handsteer.plugins.teach.verbs.calibrating import Plan, make_profile
-    from handsteer.recognition.profile import profile_name, profile_path
+    from handsteer.recognition.profile import load_profile, profile_name, profile_path
 
     timing.check()
+    if from_ is not None and camera is not None:
+        raise ProfileError("give either --from or --camera")
     path = out or profile_path(Path(profile_name(name)))
-    if out is not None:
-        check_writable("--out", out, ProfileError)
+    if out is None:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ProfileError(f"cannot make the folder of profiles {path.parent}: {error.strerror}") from None
+    check_writable("--out" if out else "--name", path, ProfileError, load_profile)
     config = settings(config_file, parameters, {"camera": {"source": camera}})
     make_profile(config, Plan(profile_name(name), path, timing, from_), json=json)
     return 0

@@ -115,6 +115,8 @@ def collect(
 
     config = settings(config_file, parameters, {"camera": {"source": camera}})
     if undo:
+        if label is not None:
+            raise DatasetError("--undo removes the last take, whatever its sign: leave out --label")
         undo_last(dataset)
         return 0
     if label is None:

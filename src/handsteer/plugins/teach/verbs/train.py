@@ -93,10 +93,10 @@ def train(
     from handsteer.plugins.teach.dataset import Dataset, load_dataset
     from handsteer.plugins.teach.train import train_signs
     from handsteer.plugins.teach.verbs.tables import teaching_tables
-    from handsteer.recognition.custom_signs import save_custom_model
+    from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
     from handsteer.recognition.recognizer import open_classifier
 
-    check_writable("--output", output, TrainingError)
+    check_writable("--output", output, TrainingError, load_custom_model)
     parts = [load_dataset(path) for path in datasets or (_DATASET,)]
     takes = tuple(take for part in parts for take in part.takes)
     dataset = Dataset(takes, frozenset().union(*(part.disabled for part in parts)))
