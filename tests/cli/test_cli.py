@@ -242,6 +242,22 @@ def test_a_reader_that_leaves_is_no_error(data_dir: Path) -> None:
     assert os.linesep in done.stdout
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no such device on this system")
+@pytest.mark.parametrize("words", ["parameters", "signs list --json", "--help", "completion bash"])
+def test_output_that_cannot_be_written_is_one_line(words: str) -> None:
+    command = f"{sys.executable} -m handsteer {words} > /dev/full"
+    done = subprocess.run(command, shell=True, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "handsteer: cannot write the output: No space left on device\n")
+
+
+def test_output_for_a_terminal_of_ascii_only_is_printed() -> None:
+    command = [sys.executable, "-m", "handsteer", "parameters", "control"]
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "--control.max-linear" in done.stdout
+
+
 @pytest.mark.parametrize(("arguments", "words"), [(["--help"], "Drive the robot"), (["signs"], "Learn the signs of")])
 def test_help_says_what_each_verb_does(capsys: pytest.CaptureFixture[str], arguments: list[str], words: str) -> None:
     assert words in prints(capsys, *arguments)

@@ -87,7 +87,7 @@ class Keys:
     @staticmethod
     def possible() -> bool:
         """Return whether single keys can be read from a terminal."""
-        return termios is not None and sys.stdin.isatty()
+        return termios is not None and sys.stdin is not None and sys.stdin.isatty()
 
     def __enter__(self) -> "Keys":
         if self.possible():
