@@ -76,6 +76,28 @@ def test_a_replay_says_that_all_is_the_same(recording: Path, capsys: pytest.Capt
     assert printed.endswith("; all the same, bit for bit\n")
 
 
+def test_nothing_is_recorded_over(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = recording.read_bytes()
+    assert run("run", "--fast", "--duration", "1", "--record", str(recording)) == 2
+    assert f"{recording} exists already" in capsys.readouterr().err
+    assert recording.read_bytes() == before
+
+
+@pytest.mark.slow
+def test_a_replay_of_a_damaged_recording_is_no_success(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content = bytearray(recording.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    damaged = tmp_path / "damaged.mcap"
+    damaged.write_bytes(content)
+    assert run("replay", str(damaged)) == 2
+    assert f"{damaged} is damaged, so only a part of it could be compared" in capsys.readouterr().err
+    damaged.write_bytes(recording.read_bytes()[:5000])
+    assert run("replay", str(damaged)) == 2
+    assert "was cut off or damaged after" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_a_replay_lists_what_differs_with_its_pictures(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -96,7 +118,10 @@ def test_a_replay_lists_what_differs_with_its_pictures(
     [
         (("replay", "missing.mcap"), "there is no recording missing.mcap"),
         (("replay", "README.md"), "README.md is not an MCAP file"),
-        (("run", "--fast", "--duration", "1", "--record", "README.md"), "README.md exists already"),
+        (
+            ("run", "--fast", "--duration", "1", "--record", "README.md"),
+            "README.md would be an MCAP file: give a name that ends with .mcap",
+        ),
         (
             ("run", "--fast", "--duration", "1", "--record", "none/drive.mcap"),
             "cannot record to none/drive.mcap: No such",

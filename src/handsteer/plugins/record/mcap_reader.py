@@ -75,7 +75,7 @@ class McapFile(Recording):
             try:
                 content = _unpacked(body)
             except _FAILURES_OF_CHUNKS as error:
-                self.problem = f"a damaged part was left out: {error}"
+                self._leave_out("part", error)
                 continue
             yield from _split(BytesIO(content), len(content))
 
@@ -100,8 +100,11 @@ class McapFile(Recording):
         try:
             return kind.read(ReadDataStream(BytesIO(body)))
         except _FAILURES as error:
-            self.problem = f"a damaged record was left out: {error}"
+            self._leave_out("record", error)
             return None
+
+    def _leave_out(self, what: str, error: Exception) -> None:
+        self.is_damaged, self.problem = True, f"a damaged {what} was left out: {error}"
 
 
 _RECORD = struct.Struct("<BQ")

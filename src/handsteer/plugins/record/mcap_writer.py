@@ -42,6 +42,8 @@ class McapWriter:
     """
 
     def __init__(self, path: Path) -> None:
+        if path.suffix != ".mcap":
+            raise RecordingError(f"{path} would be an MCAP file: give a name that ends with .mcap")
         try:
             self._file = path.open("xb")
         except FileExistsError:

@@ -62,12 +62,14 @@ class Recording(ABC):
         path: The same.
         about: The metadata that handsteer writes (:func:`handsteer.plugins.record.describe`); empty in those of others.
         problem: Why it was not read to its end; None if it was, or was not read yet.
+        is_damaged: Whether a part between others could not be read, of what was read so far.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.about: dict[str, str] = {}
         self.problem: str | None = None
+        self.is_damaged = False
 
     @cached_property
     def began_s(self) -> float:

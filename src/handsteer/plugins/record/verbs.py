@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from handsteer.cli import signals
 from handsteer.cli.app import ConfigFile, Flag, Parameters, Transport, loads
-from handsteer.cli.running import printable, say, settings, signals_ignored
+from handsteer.cli.running import fail, printable, say, settings, signals_ignored
 from handsteer.errors import RecordingError
 
 if TYPE_CHECKING:
@@ -125,6 +125,8 @@ def replay(
         print(json_format.dumps({**asdict(comparison), "software": others, "moments": moments}))
     else:
         _print_result(comparison, others, len(moments), is_exact=has_journals(file))
+    if file.is_damaged:
+        return fail(f"{recording} is damaged, so only a part of it could be compared")
     return 1 if comparison.differing else 0
 
 

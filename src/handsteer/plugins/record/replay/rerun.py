@@ -184,7 +184,8 @@ def _rerun(
     recorded = _RecordedOutputs(file, _OUTPUTS[name])
     first = next(spins, None)
     if first is None:
-        raise RecordingError(f"{file.path} has no journal of {name}: it was not recorded by `handsteer run`")
+        why = file.problem or "it was not recorded by `handsteer run`"
+        raise RecordingError(f"{file.path} has no journal of {name}: {why}")
     clock.set(first.readings)
     transport.answers.update(first.saw)
     node = make(transport, clock)
