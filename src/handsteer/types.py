@@ -187,7 +187,7 @@ class Stick:
 
     @property
     def is_valid(self) -> bool:
-        """Whether both deflections are finite; if not, the state is not known, so it is no release either."""
+        """Whether both deflections are finite; if not, the state is not known: that is not a release either."""
         return math.isfinite(self.forward) and math.isfinite(self.left)
 
 

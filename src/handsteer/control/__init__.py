@@ -138,7 +138,7 @@ class Control:
         if sign is not None:
             renewal.note("signs", sign)
         if stick is not None:
-            # A fist that is held in the middle keeps the speed of pointing: it is no release.
+            # A fist that is held in the middle keeps the speed of pointing: that is not a release.
             renewal.note("joystick", (float(stick.held), stick.forward, stick.left))
         if steering is not None:
             renewal.note(by, (steering.linear_mps / config.max_linear, steering.angular_radps / config.max_angular))
