@@ -164,10 +164,11 @@ class Control:
     def reconfigure(self, config: ControlConfig) -> Velocity | None:
         """Change limits, steps and times; return the velocity to command now if the last one exceeds the new limits.
 
-        Another mode or rule, or other actions, stop the robot, and the hand must show neutral first.
+        Another mode or rule, or another action of the sign that is shown, stops the robot, and the hand must show
+        neutral first.
         """
         stopped: Velocity | None = None
-        if _way_to_drive(config) != _way_to_drive(self._config):
+        if self._way_to_drive(config) != self._way_to_drive(self._config):
             self.safety.disarm("its rule has changed")
             stopped = self.halt()
         self._config = config
@@ -180,6 +181,9 @@ class Control:
         """Continue from ``velocity``, a slower one that was commanded instead of the last."""
         self.mux.hold_back(velocity)
         self._ramp.hold_back(velocity)
+
+    def _way_to_drive(self, config: ControlConfig) -> tuple[str, ...]:
+        return config.mode, config.rule, action_of(self.mux.shown, config.actions)
 
     def _agreeing(self, sign: str | None, stick: Stick | None) -> Stick | None:
         """Return the stick that counts: released, at once, by a sign that stops, whatever it says until another one.
@@ -208,10 +212,6 @@ class Control:
             return None
         since_s, self._since_command_s = self._since_command_s, 0.0
         return self._ramp.step(velocity, min(since_s, self._config.sign_timeout))
-
-
-def _way_to_drive(config: ControlConfig) -> tuple[object, ...]:
-    return config.mode, config.rule, config.actions
 
 
 class TwistMux:
@@ -269,6 +269,11 @@ class TwistMux:
         within = self.velocity.clamped(config.max_linear, config.max_angular)
         return self._take(within if self.source != "none" and within != self.velocity else None)
 
+    @property
+    def shown(self) -> str:
+        """The sign that is shown; ``NONE`` if it is not admitted, or if none has come."""
+        return self._last_sign or NONE
+
     def note_shown(self, sign: str) -> None:
         """Record the sign that is shown, whether it is followed or not."""
         self._last_sign = sign
@@ -306,12 +311,12 @@ class TwistMux:
         if self.source == "none":
             return Reason("no_input", f"{self._config.sign_timeout:g}")
         if not self.velocity.is_zero:
-            return Reason("sign", self._last_sign or NONE)
+            return Reason("sign", self.shown)
         return self._reason_without_motion
 
     @property
     def _reason_without_motion(self) -> Reason:
-        sign = self._last_sign or NONE
+        sign = self.shown
         if sign == NONE:
             return Reason("no_sign")
         action = action_of(sign, self._config.actions)

@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.errors import HandsteerError
+from handsteer.errors import HandsteerError, quoted
 from handsteer.regular_files import open_regular
 
 Arrays = dict[str, NDArray[Any]]
@@ -62,7 +62,8 @@ class NpzFormat:
         try:
             return build(arrays)
         except KeyError as error:
-            raise self.corrupt(f"{path}: not a {self.what}: it has no {error.args[0]}; {self.remedy}") from None
+            missing = f"there is no {quoted(str(error.args[0]))} in it"
+            raise self.corrupt(f"{path}: a damaged {self.what}, or another file: {missing}; {self.remedy}") from None
         except Exception as error:
             reason = str(error)[:_LONGEST_REASON]
             raise self.corrupt(f"{path}: a damaged {self.what} ({reason}); {self.remedy}") from None
