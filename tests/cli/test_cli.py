@@ -57,6 +57,7 @@ def prints(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -
         (["run", "--camera", "rtsp://127.0.0.1:9/x"], r"no picture comes from rtsp://127\.0\.0\.1:9/x"),
         (["run", "--world", "moon"], r"moon.*obstacles"),
         (["run", "--robot", "tank"], r"--robot: there is no 'tank': give sim, auto, ros2, dds, zenoh, ros1, generic, "),
+        (["run", "--camera", ""], r"there is no camera '': give auto, virtual"),
         (["run", "--robot", "turtlbot4"], r"there is no 'turtlbot4': did you mean turtlebot4\?"),
         (["run", "--port", "99999"], r"dashboard\.port: 99999 should be less than or equal to 65535"),
         (["run", "--control.linear-step", "7"], r"control\.linear_step: '7' should be less than or equal to 1"),

@@ -16,7 +16,7 @@ from handsteer.cameras.files import PHOTO_SUFFIXES, PhotoFolder, VideoFile, is_r
 from handsteer.cameras.webcam import Webcam, device_path, is_address, is_device, name_of, webcams
 from handsteer.clock import Clock
 from handsteer.config import CameraConfig, Config
-from handsteer.errors import CameraError, CameraNotFound
+from handsteer.errors import CameraError, CameraNotFound, quoted
 from handsteer.messages import CameraInfo, Header, RegionOfInterest, Time
 
 log = logging.getLogger(__name__)
@@ -69,10 +69,10 @@ def _webcam(source: str, config: CameraConfig, clock: Clock) -> Camera:
 
 
 def _file(path: Path, config: CameraConfig, clock: Clock) -> Camera:
-    if not path.exists():
+    if not path.exists() or not config.source.strip():  # an empty path is the working directory
         raise CameraNotFound(
-            f"there is no camera {path}: give auto, virtual, browser, a webcam's number, an address, a video file "
-            "or a folder"
+            f"there is no camera {config.source or quoted('')}: give auto, virtual, browser, a webcam's number, an "
+            "address, a video file or a folder"
         )
     if path.is_dir() or path.suffix.lower() in PHOTO_SUFFIXES:
         return PhotoFolder(path, clock, photo_duration_s=config.photo_duration, fps=config.fps, at_end=config.at_end)
