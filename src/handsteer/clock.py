@@ -19,6 +19,8 @@ _NS_PER_S = 1_000_000_000
 _LOOK_AGAIN_S = 0.005
 # Simulators publish their time 10 to 1000 times a second.
 _STANDS_AFTER_S = 0.15
+# A busy simulator is silent for less.
+_PAUSED_S = 2.0
 # Minimum change that counts as a set clock; less may be a delay.
 _LEAST_SET_S = 1.0
 # More than every timeout of what moves the robot.
@@ -159,6 +161,11 @@ class SimulatedClock:
     def silence_s(self) -> float:
         """Time since the simulator's time was last received, in real seconds."""
         return self._real() - self._told_at_s
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether the simulator's time has not advanced for two seconds of real time."""
+        return self.silence_s > _PAUSED_S
 
     def tell(self, time_s: float) -> None:
         """Set the simulator's current time to ``time_s`` seconds."""

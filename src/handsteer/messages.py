@@ -121,6 +121,11 @@ def is_zero(message: "Twist | TwistStamped") -> bool:
     return command.linear.x == 0.0 and command.angular.z == 0.0
 
 
+def is_set(message: Bool) -> bool:
+    """Return whether a message of :data:`STOP` stops the robot."""
+    return bool(message.data)
+
+
 def is_stopping(sign: String) -> bool:
     """Return whether a sign stops the robot in every configuration."""
     return sign.data in ALWAYS_STOP
@@ -152,7 +157,7 @@ CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespa
 SELECT_ROBOT = Topic("/select_robot", String, depth=10)
 SELECTED_ROBOT = Topic("/selected_robot", String, latched=True)
 # True stops the robot and overrides all inputs; false ends the Stop. No message may be lost.
-STOP = Topic("/stop", Bool, depth=10)
+STOP = Topic("/stop", Bool, depth=10, stops=is_set)
 # The state of /stop that each node remembers and publishes, for nodes that restart.
 STOPPED = Topic("/stopped", Bool, latched=True)
 # A pad begins with a zero, which must not be replaced by the deflection that follows.

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handsteer.clock import SimulatedClock
 from handsteer.config import Config, ControlConfig, JoyConfig
 from handsteer.messages import (
     CAMERA_CHANGED,
@@ -40,6 +41,7 @@ from handsteer.messages import (
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.nodes.steering import SteeringNode
 from handsteer.transports.base import Publisher, Received
+from handsteer.transports.in_process import InProcessTransport
 from handsteer.types import RELEASED, Stick
 from tests.nodes.stepping import Bench
 
@@ -979,6 +981,38 @@ def test_a_sign_whose_action_changes_while_it_is_shown_starts_nothing() -> None:
     assert set(bench.commands) == {(0, 0)}
     bench.show(*["Stop"] * 30, *["Peace"] * 30)
     assert bench.last()[0] > 0
+
+
+def test_while_the_simulators_clock_stands_still_nothing_moves() -> None:
+    real_s = 0.0
+    clock, transport = SimulatedClock(lambda: real_s), InProcessTransport()
+    clock.tell(100.0)
+    control = HandSignControlNode(transport, clock, ControlConfig(), arming=True)
+    sign, commands = transport.advertise("another_recognition", HAND_SIGN), list[float]()
+    transport.subscribe("robot", CMD_VEL, lambda received: commands.append(received.message.linear.x))
+
+    def show(what: str, seconds: float, *, pace: float = 1.0) -> None:
+        nonlocal real_s
+        for _ in range(round(seconds * 30)):
+            real_s += 1 / 30
+            if pace:
+                clock.tell(100.0 + real_s)
+            sign.publish(String(data=what))
+            control.spin_once()
+
+    show("Stop", 2.0)
+    show("Forward", 1.0)
+    assert commands[-1] > 0.0
+    show("Forward", 3.0, pace=0.0)
+    assert commands[-1] == 0.0
+    heard = len(commands)
+    show("Stop", 1.0, pace=0.0)
+    show("Forward", 1.0, pace=0.0)
+    show("Forward", 1.0)
+    assert set(commands[heard:]) <= {0.0}, "neutral that was shown meanwhile does not count"
+    show("Stop", 1.0)
+    show("Forward", 1.0)
+    assert commands[-1] > 0.0
 
 
 def test_where_no_signs_come_the_finger_points_nowhere() -> None:

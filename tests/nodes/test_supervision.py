@@ -121,6 +121,17 @@ class TestBesideOtherProcesses:
             started.run(0.05)
         assert started.twists[-1].linear.x == 0.0
 
+    def test_it_waits_while_the_transport_knows_no_publisher(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """As over ROS 1 until the master has answered."""
+        bench = Bench()
+        twists = bench.record(CMD_VEL)
+        signs = bench.transport.advertise("recognition", HAND_SIGN)
+        monkeypatch.setattr(bench.transport, "publishers_of", lambda topic: [])
+        bench.nodes = [HandSignControlNode(bench.transport, bench.clock, ControlConfig(), others_keep_stop=True)]
+        signs.publish(String(data="Forward"), 0.0)
+        bench.run(0.01)
+        assert twists[-1].linear.x == 0.0
+
     def test_alone_it_follows_at_once(self) -> None:
         bench = Bench()
         twists = bench.record(CMD_VEL)

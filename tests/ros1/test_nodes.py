@@ -91,6 +91,46 @@ def test_rostopic_pub_gives_one_twist(ros1: Ros1Graph) -> None:
     publish.kill()
 
 
+class AfterALatchedMessage:
+    """A control that starts while ``rostopic pub`` keeps a message for whoever subscribes, and a peer beside it."""
+
+    def __init__(self, graph: Ros1Graph, topic: str, kind: str, values: str) -> None:
+        self.space, self._graph = f"/n{next(numbers)}", graph
+        latched, name = f"{self.space}/{topic}", f"{self.space}/{NODE}"
+        graph.run("rostopic", "pub", latched, kind, values)
+        eventually(lambda: graph.talkers(latched))
+        (publisher,) = graph.talkers(latched)
+        self.peer = graph.peer(f"__ns:={self.space}")
+        record_twists(self.peer, f"{self.space}{CMD_VEL}")
+        graph.node("control", f"__ns:={self.space}", name=name)
+        eventually(lambda: graph.connected(name, f"{self.space}{CMD_VEL}"))
+        eventually(lambda: graph.connected(publisher, latched))
+
+    @property
+    def commands(self) -> set[tuple[float, float]]:
+        return {velocity for _, velocity in twists(self.peer, f"{self.space}{CMD_VEL}")}
+
+
+def test_a_sign_that_was_latched_before_the_control_started_moves_nothing(ros1: Ros1Graph) -> None:
+    after = AfterALatchedMessage(ros1, "gesture/hand_sign", "std_msgs/String", "data: 'Turn Left'")
+    time.sleep(1.0)
+    assert after.commands <= {(0.0, 0.0)}
+    ros1.run("rostopic", "pub", "-1", f"{after.space}/gesture/hand_sign", "std_msgs/String", "data: 'Turn Left'")
+    eventually(lambda: (0.0, 0.1) in after.commands, what="a sign that is latched now to count")
+
+
+def test_a_zero_that_was_latched_before_the_control_started_is_not_a_release(ros1: Ros1Graph) -> None:
+    after = AfterALatchedMessage(ros1, "steering/cmd_vel", "geometry_msgs/Twist", "{}")
+    after.peer.ask("advertise", topic="steering/cmd_vel", package="geometry_msgs", type="Twist")
+    eventually(lambda: after.peer.ask("listeners", topic="steering/cmd_vel") > 0)
+    held = {"topic": "steering/cmd_vel", "values": {"linear.x": 0.3}, "count": 20, "period_s": 0.05}
+    after.peer.ask("publish", **held)
+    assert after.commands <= {(0.0, 0.0)}
+    after.peer.ask("publish", topic="steering/cmd_vel", values={"linear.x": 0.0})
+    after.peer.ask("publish", **held)
+    eventually(lambda: (0.3, 0.0) in after.commands, what="a release that is shown now to count")
+
+
 def test_the_control_is_stopped_reset_and_asked_by_rosservice(ros1: Ros1Graph) -> None:
     driver = Ros1Driver(ros1, "--control.sign-timeout", "5")
     node = f"{driver.namespace}/{NODE}"
@@ -105,7 +145,7 @@ def test_the_control_is_stopped_reset_and_asked_by_rosservice(ros1: Ros1Graph) -
     driver.expect((0.01, 0.0), (0.02, 0.0))
     assert call("stop") == ["success: True", 'message: "stopped, until it is reset"']
     driver.expect((0.01, 0.0), (0.02, 0.0), (0.0, 0.0))
-    assert call("engage_state") == ["success: True", 'message: "engaged"']
+    assert call("engage_state") == ["success: True", 'message: "engaged; stopped, until it is reset"']
     assert call("reset") == ["success: True", 'message: "reset"']
     driver.show("Stop")
     driver.show("Forward")

@@ -1,5 +1,6 @@
 """Recognition and control as managed nodes: what ``ros2 lifecycle`` and Nav2's lifecycle manager call, by rclpy."""
 
+import re
 import threading
 import time
 
@@ -61,6 +62,8 @@ def test_a_lifecycle_manager_brings_a_node_up_and_down(ros2: Ros2Graph, verb: st
     node = f"/nav_{verb}/hand_sign_{verb}"
     process = ros2.node(verb, name=node, ros=("-r", f"__ns:=/nav_{verb}", "-p", "autostart:=false"))
     assert ros2.peer.ask("state", node=node) == "unconfigured"
+    for wrong in ("ACTIVATE", "DEACTIVATE", "CLEANUP", "ACTIVE_SHUTDOWN", "CALLBACK_SUCCESS"):
+        assert not ros2.peer.ask("change_state", node=node, transition=f"TRANSITION_{wrong}"), wrong
     states = []
     for transition in ("CONFIGURE", "ACTIVATE", "DEACTIVATE", "ACTIVATE", "DEACTIVATE", "CLEANUP", "CONFIGURE"):
         assert ros2.peer.ask("change_state", node=node, transition=f"TRANSITION_{transition}")
@@ -68,7 +71,9 @@ def test_a_lifecycle_manager_brings_a_node_up_and_down(ros2: Ros2Graph, verb: st
     assert states == ["inactive", "active", "inactive", "active", "inactive", "unconfigured", "inactive"]
     assert ros2.peer.ask("change_state", node=node, transition="TRANSITION_INACTIVE_SHUTDOWN")
     assert ros2.peer.ask("state", node=node) == "finalized"
+    assert not ros2.peer.ask("change_state", node=node, transition="TRANSITION_ACTIVATE")
     assert process.running
+    assert "Traceback" not in process.text
 
 
 def test_a_control_that_is_not_yet_active_commands_nothing_but_remembers_a_stop(ros2: Ros2Graph) -> None:
@@ -92,10 +97,12 @@ def test_a_control_that_is_not_yet_active_commands_nothing_but_remembers_a_stop(
     show("Forward", 20)
     eventually(lambda: twists(peer, cmd_vel), what="zeros")
     assert {velocity for _, velocity in twists(peer, cmd_vel)} == {(0.0, 0.0)}
-    assert peer.ask("call", service=f"{node}/engage_state") == {"success": True, "message": "engaged"}
+    said = peer.ask("call", service=f"{node}/engage_state")
+    assert said == {"success": True, "message": "engaged; stopped, until it is reset"}
 
 
-def test_what_autostart_is_no_boolean_is_said(ros2: Ros2Graph) -> None:
-    node = ros2.handsteer("control", "--transport", "ros2", "--ros-args", "-p", "autostart:=maybe")
+@pytest.mark.parametrize(("name", "value"), [("autostart", "maybe"), ("use_sim_time", "3")])
+def test_what_is_not_a_boolean_is_said(ros2: Ros2Graph, name: str, value: str) -> None:
+    node = ros2.handsteer("control", "--transport", "ros2", "--ros-args", "-p", f"{name}:={value}")
     assert node.code() == 2
-    assert "ROS parameter autostart: 'maybe' should be true or false" in node.text
+    assert re.search(f"ROS parameter {name}: '?{value}'? should be true or false", node.text), node.text

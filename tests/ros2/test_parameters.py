@@ -90,6 +90,9 @@ def test_a_limit_that_is_broken_and_a_change_too_late_are_refused_in_words(ros2:
     (result,) = ask(ros2, node, "set_parameters", {"name": "use_sim_time", "value": True})["results"]
     assert not result["successful"]
     assert result["reason"].startswith("use_sim_time cannot be set")
+    depth = "qos_overrides./late/image_raw.publisher.depth"
+    (result,) = ask(ros2, node, "set_parameters", {"name": depth, "value": 3})["results"]
+    assert result == {"successful": False, "reason": f"{depth} cannot be set: it is only read when the node starts"}
 
 
 def test_a_whole_number_does_for_a_double_and_entries_of_a_table_come_and_go(ros2: Ros2Graph) -> None:

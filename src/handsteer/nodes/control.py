@@ -5,7 +5,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from handsteer.clock import Clock
+from handsteer.clock import Clock, SimulatedClock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, JoyConfig, assist_of
 from handsteer.control import Control
 from handsteer.control.actions import AddedActions
@@ -272,6 +272,9 @@ class HandSignControlNode(Node):
             return
         if self._waits_for_others():
             self._publish(ZERO, captured_s)
+        elif isinstance(self.clock, SimulatedClock) and self.clock.is_paused:
+            self._safety.stall("the clock stands still")
+            self._publish(self._control.halt())
         elif is_late:
             self._publish(self._control.halt() if is_stop else None)
         else:

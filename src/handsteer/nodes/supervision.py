@@ -44,10 +44,13 @@ class StopKeeper:
 
     @property
     def waits_for_others(self) -> bool:
-        """Whether other nodes publish ``/stopped``, and this one may not have received it since its start."""
+        """Whether other nodes publish ``/stopped``, and this one may not have received it since its start.
+
+        Its own publisher is one of them: where none is known, the transport has not heard of any yet.
+        """
         if self._node.clock.now() >= self._waits_until_s:
             return False
-        return len(self._node.transport.publishers_of(STOPPED)) > 1  # one is its own
+        return len(self._node.transport.publishers_of(STOPPED)) != 1
 
     def _on_stop_or_reset(self, received: Received[Bool]) -> None:
         self._take(bool(received.message.data))

@@ -3,9 +3,11 @@
 import errno
 import http.client
 import logging
+import math
 import select
 import socket
 import threading
+import time
 import urllib.parse
 import xmlrpc.client
 from typing import Any
@@ -130,6 +132,7 @@ class _ImpatientTransport(xmlrpc.client.Transport):
 
 
 _PERIOD_S = 4.0
+_ANSWER_HOLDS_S = 0.5
 
 log = logging.getLogger(__name__)
 
@@ -142,6 +145,21 @@ class SystemState:
         self._thread: threading.Thread | None = None
         self._closed = threading.Event()
         self._publishers: dict[str, list[str]] = {}
+        self._asked: tuple[float, dict[str, list[str]]] = (-math.inf, {})
+
+    def publishers_before(self, topic: str) -> set[str] | None:
+        """Ask the master which nodes publish the topic of this full name; None if it does not answer.
+
+        What it answered in the last half second counts: a process subscribes to many topics at once.
+        """
+        with self._lock:
+            if time.monotonic() - self._asked[0] > _ANSWER_HOLDS_S:
+                try:
+                    publishers = Master(rosgraph.get_master_uri()).publishers(rospy.get_name())
+                except TransportError:
+                    return None
+                self._asked = time.monotonic(), publishers
+            return set(self._asked[1].get(topic, []))
 
     def publishers_of(self, topic: str) -> list[str]:
         """Return the nodes that publish the topic of this full name; empty until the master has replied."""

@@ -8,6 +8,7 @@ import functools
 import itertools
 import re
 import socket
+import time
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
@@ -19,6 +20,7 @@ from handsteer.clock import Clock
 from handsteer.messages import Topic, type_name
 from handsteer.plugins.ros1.conversion import from_ros1, ros1_type, to_ros1
 from handsteer.plugins.ros1.master import SystemState
+from handsteer.timeouts import HEAR_STOP_S
 from handsteer.transports.base import Deliver, Received
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
 from handsteer.transports.timing import capture_time
@@ -92,9 +94,15 @@ class Ros1Transport(BaseTransport):
         size = _BUFFER_BYTES.get(kind, _SMALL_BUFFER_BYTES)
 
         def receive(send: Deliver[M]) -> Callable[[], None]:
+            kept = _Kept(self._state.publishers_before(name)) if topic.stops is not None else None
+
             def on_message(theirs: Any) -> None:
                 message = from_ros1(theirs, kind)
                 captured_s = capture_time(message, self._clock)
+                if kept is not None and kept.has(theirs):
+                    if topic.stops is not None and topic.stops(message):
+                        send(Received(message, captured_s, is_late=True))
+                    return
                 send(Received(message, captured_s, by_player=captured_s is not None and _is_player(theirs)))
 
             is_image = size > _SMALL_BUFFER_BYTES
@@ -112,8 +120,36 @@ class Ros1Transport(BaseTransport):
 
 def _is_player(theirs: Any) -> bool:
     """Return whether ``rosbag play`` sent a message: its nodes are always called play and the time."""
-    header = getattr(theirs, "_connection_header", None) or {}
-    return _PLAYER.fullmatch(header.get("callerid", "")) is not None
+    return _PLAYER.fullmatch(_header(theirs).get("callerid", "")) is not None
+
+
+def _header(theirs: Any) -> Mapping[str, str]:
+    return getattr(theirs, "_connection_header", None) or {}
+
+
+class _Kept:
+    """Recognises what publishers that latch had sent before we subscribed, such as ``rostopic pub`` without ``-1``.
+
+    They send it again to each new subscriber, as its first message: it says nothing of now.
+
+    Args:
+        publishers: The nodes that published the topic before; None if that is not known.
+    """
+
+    def __init__(self, publishers: set[str] | None) -> None:
+        self._waits = publishers
+        self._until_s = time.monotonic() + HEAR_STOP_S
+
+    def has(self, theirs: Any) -> bool:
+        """Return whether a message is one of these; each has to be asked for, once."""
+        header = _header(theirs)
+        publisher, latches = header.get("callerid", ""), header.get("latching") == "1"
+        if self._waits is None:
+            return latches and time.monotonic() < self._until_s
+        if publisher not in self._waits:
+            return False
+        self._waits.discard(publisher)
+        return latches
 
 
 class _Ros1Publisher(BasePublisher[M]):

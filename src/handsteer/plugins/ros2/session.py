@@ -9,6 +9,7 @@ from typing import Any
 
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 from rclpy.exceptions import NameValidationException
@@ -132,9 +133,7 @@ class RclpySession(Session):
         """
         if not self._node.has_parameter(_AUTOSTART):
             self._node.declare_parameter(_AUTOSTART, True)
-        starts = self._node.get_parameter(_AUTOSTART).value
-        if not isinstance(starts, bool):
-            raise TransportError(f"ROS parameter {_AUTOSTART}: {starts!r} should be true or false")
+        starts = _switch(self._node, _AUTOSTART)
         node.is_active = starts
         self._node.manage(node)
         if starts:
@@ -171,7 +170,7 @@ class RclpySession(Session):
         self._context.destroy()
 
     def _make_clock(self) -> Clock:
-        if not self._node.get_parameter("use_sim_time").value:
+        if not _switch(self._node, "use_sim_time"):
             return WallClock()
         simulated, theirs = SimulatedClock(), self._node.get_clock()
         # Referenced, because rclpy does not keep it.
@@ -192,6 +191,13 @@ class RclpySession(Session):
                 if not self._left.is_set():
                     log.exception("ROS 2: a message could not be served")
                     self._left.wait(_AFTER_FAILURE_S)  # repeated failures must not use up the processor
+
+
+def _switch(node: Node, name: str) -> bool:
+    value = node.get_parameter(name).value
+    if not isinstance(value, bool):
+        raise TransportError(f"ROS parameter {name}: {value!r} should be true or false")
+    return value
 
 
 def _answer(call: Call, _request: Any, reply: Any) -> Any:
@@ -220,6 +226,16 @@ class LateManagedNode(LifecycleNodeMixin, Node):  # type: ignore[misc]
         super().destroy_node()
         if self._managed is not None:
             self._state_machine.destroy_when_not_in_use()
+
+    # rclpy calls it by this name; without it, its own is called.
+    def _LifecycleNodeMixin__on_change_state(self, request: Any, reply: Any) -> Any:  # noqa: N802
+        """Answer also where the state has no such transition: rclpy raises then, and whoever asked waits for ever."""
+        try:
+            return LifecycleNodeMixin._LifecycleNodeMixin__on_change_state(self, request, reply)
+        except RCLError as error:
+            log.warning("a transition is refused: %s", " ".join(str(error).split()))
+            reply.success = False
+            return reply
 
     def on_activate(self, state: Any) -> Any:
         """Activate the node."""
@@ -326,8 +342,10 @@ class ParameterLink:
 
     def _refuse_ros_own(self, given: Sequence[Parameter]) -> None:
         for one in given:
-            is_set = _is_of_ros(one.name) and self._node.has_parameter(one.name)
-            if is_set and self._node.get_parameter(one.name).value != one.value:
+            if not _is_of_ros(one.name):
+                continue
+            is_set = self._node.has_parameter(one.name)
+            if self._node.get_parameter(one.name).value != one.value if is_set else one.name.startswith(_QOS):
                 raise ConfigError(f"{one.name} cannot be set: it is only read when the node starts")
 
 
