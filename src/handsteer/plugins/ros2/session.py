@@ -229,7 +229,7 @@ class LateManagedNode(LifecycleNodeMixin, Node):  # type: ignore[misc]
 
     # rclpy calls it by this name; without it, its own is called.
     def _LifecycleNodeMixin__on_change_state(self, request: Any, reply: Any) -> Any:  # noqa: N802
-        """Answer also where the state has no such transition: rclpy raises then, and whoever asked waits for ever."""
+        """Answer also where the state has no such transition: rclpy raises then, and its client waits without end."""
         try:
             return LifecycleNodeMixin._LifecycleNodeMixin__on_change_state(self, request, reply)
         except RCLError as error:
