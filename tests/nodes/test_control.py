@@ -977,6 +977,7 @@ def test_a_hand_whose_stamp_does_not_advance_is_one_message(ahead_s: float) -> N
     for _ in range(60):
         bench.joys.publish(joy_of(AHEAD, header), stamped_s)
         bench.run(1 / 30)
+    assert [velocity for velocity in bench.commands if velocity != (0, 0)] == [(0.5, 0)]
     assert bench.last() == (0, 0)
 
 
