@@ -69,6 +69,19 @@ def test_what_is_wrong_is_said_in_the_words_for_a_file(tmp_path: Path, path: str
     assert message(FIELDS[path].parse, text.strip("'")) == of_file
 
 
+@pytest.mark.parametrize("text", ["1_0", "0x10", "1:30", "0,5", "0.5 # fast", "-0b1", "1e", "1.2.3", "9" * 70])
+def test_what_only_yaml_takes_for_a_number_is_refused(text: str) -> None:
+    said = message(FIELDS["control.max_linear"].parse, text)
+    assert said.startswith("control.max_linear: ")
+    assert said.endswith("should be a number such as 0.5")
+
+
+@pytest.mark.parametrize(("text", "value"), [("0640", 640), (" 640 ", 640), ("6.4e2", 640), ("+640", 640)])
+def test_a_number_is_decimal(text: str, value: int) -> None:
+    assert FIELDS["camera.width"].parse(text) == value
+    assert FIELDS["control.max_linear"].parse(".5") == 0.5
+
+
 def outcome(field: Field, text: str) -> Any:
     """Return the value, which is shown as a text that means it, or the words that refuse it."""
     try:

@@ -138,6 +138,50 @@ def test_letters_drive_wherever_the_focus_is_and_the_plot_shows_it(visit: Visit)
     assert visit.troubles == []
 
 
+def test_a_key_that_is_held_over_a_reload_or_before_the_seat_has_to_be_pressed_again(visit: Visit) -> None:
+    def repeat(page: Page) -> None:
+        for _ in range(15):
+            page.keyboard.down("KeyW")  # as the system repeats it
+            page.wait_for_timeout(50)
+
+    page = visit.page
+    take_seat(visit)
+    page.keyboard.down("KeyW")
+    visit.wait_until(lambda: speed(visit) > 0.1 or pressed_again(visit, "KeyW"))
+    page.reload()
+    take_seat(visit)
+    visit.wait_until(lambda: stands(visit))
+    repeat(page)
+    assert stands(visit)
+    page.keyboard.up("KeyW")
+    page.keyboard.down("KeyW")
+    visit.wait_until(lambda: speed(visit) > 0.1 or pressed_again(visit, "KeyW"))
+    page.keyboard.up("KeyW")
+
+
+def test_the_driver_keeps_the_seat_on_the_way_to_another_page(visit: Visit) -> None:
+    page, second = visit.page, visit.another_page()
+    take_seat(visit)
+    second.goto(page.url)
+    second.locator(".steer").wait_for()
+    for link, there in (("Settings", ".settings"), ("Drive", ".steer.yours")):
+        page.get_by_role("link", name=link, exact=True).click()
+        page.locator(there).first.wait_for()
+        page.wait_for_timeout(500)
+        assert not second.locator(".steer.yours").count()
+
+
+def test_the_space_key_stops_also_in_a_field_of_a_number(visit: Visit) -> None:
+    page = visit.page
+    take_seat(visit)
+    page.get_by_role("link", name="Settings", exact=True).click()
+    field = page.locator("input[inputmode=decimal]").first
+    before = field.input_value()
+    field.press("Space")
+    visit.wait_until(lambda: visit.graph.control._safety.is_stopped)
+    assert field.input_value() == before
+
+
 def test_sliders_of_who_watches_do_nothing(visit: Visit) -> None:
     first, second = visit.page, visit.another_page()
     take_seat(visit)

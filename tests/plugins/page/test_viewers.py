@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.plugins.page.viewers import ANSWER_S, ControlLease, LeaseStatus
+from handsteer.plugins.page.viewers import ALONE_S, ANSWER_S, ControlLease, FreeSeat, LeaseStatus
 
 
 @pytest.fixture
@@ -25,6 +25,19 @@ def test_a_driver_who_leaves_frees_the_seat(lease: ControlLease) -> None:
     lease.leave("anna")
     assert lease.status_of("ben", 1.0) == LeaseStatus("free")
     assert lease.take("ben", 1.0)
+
+
+def test_a_seat_that_is_free_for_a_moment_is_that_of_the_drivers_next_page() -> None:
+    watcher, driver = FreeSeat(), FreeSeat()
+    assert watcher.is_for(drove_last=None, is_alone=True, now_s=0.0), "the first page"
+    assert not FreeSeat().is_for(drove_last=None, is_alone=False, now_s=0.0)
+    assert not watcher.is_for(drove_last=False, is_alone=False, now_s=9.0)
+    assert not watcher.is_for(drove_last=False, is_alone=True, now_s=10.0)
+    assert driver.is_for(drove_last=True, is_alone=False, now_s=10.1)
+    assert not watcher.is_for(drove_last=False, is_alone=False, now_s=10.1)
+    assert not watcher.is_for(drove_last=False, is_alone=True, now_s=20.0)
+    assert not watcher.is_for(drove_last=False, is_alone=True, now_s=20.0 + ALONE_S - 0.1)
+    assert watcher.is_for(drove_last=False, is_alone=True, now_s=20.0 + ALONE_S)
 
 
 def test_the_driver_may_hand_over(lease: ControlLease) -> None:

@@ -61,8 +61,10 @@ class ClassCards:
 
     def _add(self) -> None:
         name = str(self._name.value or "")
-        self._lesson.do(lambda lesson: lesson.add_class(name))
-        self._name.set_value("")
+        # Next to the field, too: the lesson's messages may be out of sight.
+        self._name.error = self._lesson.do(lambda lesson: lesson.add_class(name)) or None
+        if not self._name.error:
+            self._name.set_value("")
 
 
 class _Bar:

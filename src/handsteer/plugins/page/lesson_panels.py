@@ -13,7 +13,7 @@ from handsteer.plugins.page.lesson import Lesson
 from handsteer.plugins.page.lesson_files import CAN_EXPORT, LESSON_PATH
 from handsteer.plugins.page.lesson_node import LessonNode
 from handsteer.plugins.page.lesson_state import LessonState, outcome, training_words
-from handsteer.plugins.page.lessons import Lessons
+from handsteer.plugins.page.lessons import Lessons, person_named
 from handsteer.plugins.page.page import Page
 from handsteer.plugins.page.settings import Settings
 from handsteer.plugins.page.settings_fields import FIELDS
@@ -47,16 +47,18 @@ class ViewerLesson:
         """The lesson, if there is one."""
         return self.lessons.node(self.viewer)
 
-    def do(self, action: Callable[[Lesson], object]) -> None:
-        """Call ``action`` with the lesson, if there is one, and show any error in it."""
+    def do(self, action: Callable[[Lesson], object]) -> str:
+        """Call ``action`` with the lesson, if there is one; show and return an error message, empty if none."""
         node = self.node
         if node is None:
-            return
+            return ""
         try:
             node.do(action)
         except HandsteerError as error:
             words = f"{error}."
             node.do(lambda lesson: lesson.say(words))
+            return words
+        return ""
 
     def hold(self, sent: object) -> None:
         """Record a take while a button is held, as the browser reports."""
@@ -72,6 +74,8 @@ class ViewerLesson:
         """Stop the robot, and begin a lesson if the viewer drives."""
         node = self._page.node
         if node is None or not self.may_change():
+            return
+        if await self.run(lambda: person_named(person)):
             return
         node.halt(self.viewer, "the lesson")
         await self.run(lambda: self.lessons.begin(self.viewer, person, restore=restore))

@@ -116,7 +116,7 @@ class Lessons:
         old = self.model_path.expanduser()
         model = load_custom_model(old) if old.exists() else None
         when = f"{datetime.datetime.now():%Y-%m-%d %H:%M}"
-        lesson = Lesson(dataset, self._plan, Facts(NONE, _person(person), when, "page"), model)
+        lesson = Lesson(dataset, self._plan, Facts(NONE, person_named(person), when, "page"), model)
         with self._lock:
             self._end()
             if self._closed:
@@ -250,7 +250,12 @@ def _version(path: Path) -> _Version:
     return status.st_mtime_ns, status.st_size
 
 
-def _person(name: str) -> str:
+def person_named(name: str) -> str:
+    """Return the name of a person without needless spaces, ``me`` if it is empty.
+
+    Raises:
+        DatasetError: It is not a valid name.
+    """
     name = " ".join(name.split())
     if len(name) > _LONGEST_PERSON or not name.isprintable():
         raise DatasetError(

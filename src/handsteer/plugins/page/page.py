@@ -25,7 +25,7 @@ from handsteer.plugins.page.remote_graph import RemoteGraph
 from handsteer.plugins.page.settings import Settings
 from handsteer.plugins.page.state import PageState
 from handsteer.plugins.page.status_bar import Banner, Cues, LeasePanel, TimingLine
-from handsteer.plugins.page.viewers import LeaseStatus, OnDemandNode, PageAudit
+from handsteer.plugins.page.viewers import FreeSeat, LeaseStatus, OnDemandNode, PageAudit
 from handsteer.plugins.study.session import Session
 
 log = logging.getLogger(__name__)
@@ -141,6 +141,7 @@ class Page:
             ui.add_head_html(_ASSET[name.rpartition(".")[2]].format(f"{ASSETS_PATH}/{name}"))
         self._top(path)
         self._banner = Banner(self._halt, self._reset)
+        self._free_seat = FreeSeat()
         self._unread: tuple[int | None, float] = (None, 0.0)
         ui.timer(_PERIOD_S, self._update)
 
@@ -229,8 +230,12 @@ class Page:
     def _update(self) -> None:
         node = self.node
         if node is not None and self._reads():
-            if self._context.node.is_watched_only_by(self.client.id):
-                node.lease.take(self.client.id, node.clock.now())
+            viewer, now_s = self.client.id, node.clock.now()
+            drove_last = self._context.audit.drove_last(viewer)
+            is_alone = self._context.node.is_watched_only_by(viewer)
+            may_take = self._free_seat.is_for(drove_last=drove_last, is_alone=is_alone, now_s=now_s)
+            if may_take and node.lease.driver is None:
+                node.lease.take(viewer, now_s)
             self.show(node, self._with_camera(node.state(self.client.id), self.lease(node)))
 
     def _with_camera(self, state: PageState, lease: LeaseStatus) -> PageState:

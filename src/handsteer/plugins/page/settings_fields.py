@@ -10,7 +10,7 @@ import yaml
 
 from handsteer import plain_yaml
 from handsteer.config import Config, validate
-from handsteer.errors import ConfigError
+from handsteer.errors import ConfigError, quoted
 from handsteer.parameters import Description, describe, plain, section_model
 
 FieldKind = Literal["switch", "choice", "number", "text", "list", "table"]
@@ -60,6 +60,7 @@ COMMON: Mapping[str, str] = MappingProxyType(
 """The parameters that people change most, in the order of the page, and their titles."""
 
 _WORDS = {"cmd": "command", "id": "ID", "max": "maximum", "min": "minimum", "odom": "odometry", "vel": "velocity"}
+_NUMBER = re.compile(r"[-+]?(\d{1,64}|\d{0,64}\.\d{1,64}|\d{1,64}\.)([eE][-+]?\d{1,4})?", re.ASCII)
 _FOR_THE_DRIVER = frozenset({"dashboard.certificate", "dashboard.private_key"})
 _WITH_UNIT = re.compile(r"(.*?)(?: \[([^\]]+)\])?")
 _PASSWORD = re.compile(
@@ -143,7 +144,7 @@ class Field:
         if not text and self.optional:
             return None
         if self.kind in ("number", "switch"):
-            return _number_or_switch(text)
+            return _number_or_switch(text, self.path)
         if self.kind == "list":
             return self._scalars(f"[{text}]")
         if self.kind == "table":
@@ -195,8 +196,17 @@ def _allowed(known: Description) -> str:
     return ", ".join(part for part in (lowest, highest) if part)
 
 
-def _number_or_switch(text: str) -> Any:
-    """Return the value that YAML reads in ``text``, else ``text``."""
+def _number_or_switch(text: str, path: str) -> Any:
+    """Return the number, true or false in ``text``, else ``text``.
+
+    Raises:
+        ConfigError: It is a number to YAML only, which reads 0640 as 416, 1_0 as 10 and 1:30 as 90.
+    """
+    text = text.strip()
+    if _NUMBER.fullmatch(text):
+        return float(text) if set(text) & set(".eE") else int(text)
+    if text[:1].isdecimal() or text[1:2].isdecimal():
+        raise ConfigError(f"{path}: {quoted(text)} should be a number such as 0.5")
     try:
         value = plain_yaml.parse(text, "", ConfigError)
     except ConfigError:

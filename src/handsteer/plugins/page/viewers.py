@@ -1,6 +1,7 @@
 """The viewers of the page: the control lease, the nodes that run for them, and what the audit says of them."""
 
 import itertools
+import math
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
@@ -15,6 +16,9 @@ from handsteer.transports.base import Transport
 
 ANSWER_S = 10.0
 """A request that the driver does not answer within this time is granted."""
+
+ALONE_S = 5.0
+"""After this long alone, a page of another viewer than the last driver takes the lease."""
 
 Role = Literal["driver", "watcher", "free"]
 SeatChangeReason = Literal["free", "handed_over", "unanswered", "left"]
@@ -124,6 +128,30 @@ class ControlLease:
         self._on_change(before, driver, how)
 
 
+class FreeSeat:
+    """Decides whether a page may take the lease when it is free.
+
+    The driver's next page may at once, as after a reload; another one only after it has been alone for
+    :data:`ALONE_S`: else one who watches would drive as soon as the driver goes to another page.
+    """
+
+    def __init__(self) -> None:
+        self._alone_since_s = math.inf
+
+    def is_for(self, *, drove_last: bool | None, is_alone: bool, now_s: float) -> bool:
+        """Return whether it may.
+
+        Args:
+            drove_last: Whether the viewer of the page drove last; None if there has not been a driver.
+            is_alone: Whether there is no other page.
+            now_s: The time.
+        """
+        self._alone_since_s = min(self._alone_since_s, now_s) if is_alone else math.inf
+        if drove_last is None:
+            return is_alone
+        return drove_last or now_s - self._alone_since_s >= ALONE_S
+
+
 N = TypeVar("N", bound=Node)
 
 
@@ -184,6 +212,7 @@ class OnDemandNode(Generic[N]):
 
 _MOST_SESSIONS = 1000
 _UNKNOWN = "a viewer"
+_NO_DRIVER = "dashboard"
 
 
 class PageAudit:
@@ -195,7 +224,7 @@ class PageAudit:
     """
 
     def __init__(self, transport: Transport, clock: Clock) -> None:
-        self.driver = "dashboard"
+        self.driver = _NO_DRIVER
         self.on_driver: Callable[[str | None], None] = lambda _: None
         self._auditor = Auditor(transport, "dashboard", clock)
         self._clock = clock
@@ -226,6 +255,10 @@ class PageAudit:
     def name_of(self, viewer: str) -> str:
         """Return the name of ``viewer``, such as ``viewer 1 (127.0.0.1)``."""
         return self._names.get(viewer, _UNKNOWN)
+
+    def drove_last(self, viewer: str) -> bool | None:
+        """Return whether ``viewer`` is the driver, or was the last one; None if there has not been one."""
+        return None if self.driver == _NO_DRIVER else self.driver == self.name_of(viewer)
 
     def person_of(self, viewer: str) -> str:
         """Return what is the same for all pages of one browser, even of those that it has left."""

@@ -38,9 +38,10 @@ async function sendStop(number) {
 }
 window.pressStop = pressStop;
 
-// Anywhere except in text inputs; a focused button would otherwise take the space key as a click.
+// Anywhere except where a space can be typed; a focused button would otherwise take the space key as a click.
+const TAKES_SPACE = "input:not([type=number], [inputmode=decimal], [type=color], [readonly]), textarea:not([readonly]), [contenteditable]";
 document.addEventListener("keydown", (event) => {
-  if (event.code !== "Space" || event.target.closest?.("input:not([type=number]), textarea, select, [contenteditable]")) return;
+  if (event.code !== "Space" || event.target.closest?.(TAKES_SPACE)) return;
   event.preventDefault();
   if (!event.repeat) emitEvent("space", { press: pressStop() });
 }, true);

@@ -108,6 +108,7 @@ function pressKey(event) {
   const pad = padOf(event);
   if (!pad) return;
   event.preventDefault();
+  if (event.repeat && !pressed.has(event.code)) return; // held since before this page or its seat: press it again
   pressed.add(event.code);
   followKeys(pad);
 }

@@ -988,6 +988,7 @@ const WORDS = {
   "{} should be less than #": "{} sollte kleiner als # sein",
   "{} should be a valid number, unable to parse string as a number": "{} sollte eine Zahl sein",
   "{} should be a valid number": "{} sollte eine Zahl sein",
+  "{} should be a number such as #": "{} sollte eine Zahl sein wie #",
   "{} should be a finite number": "{} sollte eine endliche Zahl sein",
   "{} should be a valid integer, unable to parse string as an integer": "{} sollte eine ganze Zahl sein",
   "{} should be a valid integer, got a number with a fractional part": "{} sollte eine ganze Zahl sein",
