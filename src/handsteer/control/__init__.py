@@ -271,7 +271,7 @@ class TwistMux:
 
     @property
     def shown(self) -> str:
-        """The sign that is shown; ``NONE`` if it is not admitted, or if none has come."""
+        """The last sign of :meth:`note_shown`; ``NONE`` if there has not been one."""
         return self._last_sign or NONE
 
     def note_shown(self, sign: str) -> None:
