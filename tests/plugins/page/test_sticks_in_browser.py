@@ -149,6 +149,7 @@ def phone(visit: Visit, script: str = "") -> Iterator[Page]:
     page = browser.new_page(viewport={"width": 390, "height": 740}, has_touch=True, is_mobile=True)
     page.on("pageerror", lambda error: visit.troubles.append(str(error)))
     page.add_init_script(f"{TILTS_UNASKED}; {script}")
+    visit.page.locator(".steer.yours").wait_for()  # some seconds after a phone that drove has left
     page.goto(visit.page.url)
     page.get_by_role("button", name="Ask to drive").click()
     visit.page.get_by_role("button", name="Hand over").click()
