@@ -961,14 +961,7 @@ def test_an_old_message_makes_no_old_gesture_new() -> None:
     assert not bench.control._safety.engagement.engaged
 
 
-@pytest.mark.parametrize("ahead_s", [0.5, 10.0, 1e6])
-def test_a_hand_that_is_stamped_ahead_is_not_followed(ahead_s: float) -> None:
-    bench = ControlBench(ControlConfig(mode="joystick"))
-    bench.hold(*[RELEASED] * 30, *[AHEAD] * 30, age_s=-ahead_s)
-    assert bench.commands == []
-
-
-@pytest.mark.parametrize("ahead_s", [0.1, 0.2])
+@pytest.mark.parametrize("ahead_s", [0.1, 1000.0])
 def test_a_hand_whose_stamp_does_not_advance_is_one_message(ahead_s: float) -> None:
     bench = ControlBench(ControlConfig(mode="joystick"))
     stamped_s = bench.clock.now() + ahead_s

@@ -243,12 +243,9 @@ class HandSignControlNode(Node):
             self._safety.note_rest("gamepad")
 
     def _is_stale(self, received: Received[Any]) -> bool:
-        """Return whether a message shows what is too old, or was seen by another camera; the watchdog keeps running.
-
-        How old one is that is stamped ahead is not known.
-        """
+        """Return whether a message shows what is too old, or was seen by another camera; the watchdog keeps running."""
         captured_s = received.captured_s
-        is_old = captured_s is not None and abs(self.clock.now() - captured_s) > self._config.sign_timeout
+        is_old = captured_s is not None and self.clock.now() - captured_s > self._config.sign_timeout
         is_of_other = captured_s is not None and captured_s < self._camera_since_s
         return is_old or is_of_other or received.is_late
 
