@@ -308,6 +308,19 @@ def test_what_a_network_held_back_moves_nothing() -> None:
         assert graph.robot.path_length_m - before_m < 0.02
 
 
+def press_until_it_drives(graph: Graph, viewer: Viewer) -> None:
+    """Release and press again, as a person does where a busy machine has held up what the program sent."""
+    for _ in range(10):
+        time.sleep(2 * HOLD_TIMEOUT_S)
+        with repeated(lambda: viewer.command(0.2)):
+            end_s = time.monotonic() + 3.0
+            while time.monotonic() < end_s:
+                if speed(graph) > 0.1:
+                    return
+                time.sleep(0.05)
+    pytest.fail("pressed again and again in vain")
+
+
 @pytest.mark.slow
 def test_a_short_stall_of_a_network_is_no_release() -> None:
     """The program holds its button all the time; what it sends meanwhile comes late, and all at once."""
@@ -318,8 +331,7 @@ def test_a_short_stall_of_a_network_is_no_release() -> None:
         viewer = opened.enter_context(Viewer(address._replace(netloc=f"127.0.0.1:{relay.port}").geturl()))
         viewer.advertise()
         tap(lambda: viewer.command(0.2))
-        with repeated(lambda: viewer.command(0.2)):
-            eventually(lambda: speed(graph) > 0.1)
+        press_until_it_drives(graph, viewer)
         relay.freeze()
         eventually(lambda: stands(graph))
         for _ in range(3):
@@ -330,9 +342,7 @@ def test_a_short_stall_of_a_network_is_no_release() -> None:
         with repeated(lambda: viewer.command(0.2)):
             time.sleep(1.5)
             assert graph.robot.path_length_m - before_m < 0.02
-        time.sleep(2 * HOLD_TIMEOUT_S)
-        with repeated(lambda: viewer.command(0.2)):
-            eventually(lambda: speed(graph) > 0.1)
+        press_until_it_drives(graph, viewer)
 
 
 @pytest.mark.parametrize(
