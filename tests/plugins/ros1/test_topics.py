@@ -3,6 +3,7 @@
 import socket
 import threading
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -118,3 +119,19 @@ def test_subscriber_that_has_left_is_said(ends: tuple[socket.socket, socket.sock
     with pytest.raises(TransportTerminated):
         connection.write_data(message(1))
     assert transport.done
+
+
+def test_what_a_publisher_has_latched_before_is_kept_apart_once() -> None:
+    from handsteer.plugins.ros1.topics import _Kept  # noqa: PLC0415 - rospy is not everywhere
+
+    def of(publisher: str, *, latches: bool) -> Any:
+        return SimpleNamespace(_connection_header={"callerid": publisher, "latching": str(int(latches))})
+
+    kept = _Kept({"/old", "/plain"})
+    assert kept.has(of("/old", latches=True))
+    assert not kept.has(of("/old", latches=True)), "its next message is new"
+    assert not kept.has(of("/plain", latches=False))
+    assert not kept.has(of("/new", latches=True)), "it was not there before, as rostopic pub -1"
+    unknown = _Kept(None)
+    assert unknown.has(of("/any", latches=True))
+    assert not unknown.has(of("/any", latches=False))
