@@ -115,6 +115,10 @@ class Topic(Generic[M]):
         return self.name if self.is_global else self.name.removeprefix("/")
 
 
+NO_STAMP = Time(sec=0, nanosec=0)
+"""The stamp of a message without one."""
+
+
 def is_zero(message: "Twist | TwistStamped") -> bool:
     """Return whether a velocity command is zero."""
     command = twist_in(message)

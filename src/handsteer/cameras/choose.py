@@ -17,13 +17,12 @@ from handsteer.cameras.webcam import Webcam, device_path, is_address, is_device,
 from handsteer.clock import Clock
 from handsteer.config import CameraConfig, Config
 from handsteer.errors import CameraError, CameraNotFound, quoted
-from handsteer.messages import CameraInfo, Header, RegionOfInterest, Time
+from handsteer.messages import NO_STAMP, CameraInfo, Header, RegionOfInterest
 
 log = logging.getLogger(__name__)
 
 _RECORDED = "recorded-file"
 _MATRICES = {"camera_matrix": 9, "rectification_matrix": 9, "projection_matrix": 12}
-_NO_TIME = Time(sec=0, nanosec=0)
 _WHOLE = RegionOfInterest(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
 
 
@@ -151,7 +150,7 @@ def _info(
     size: tuple[int, int], model: str, distortion: NDArray[np.float64], matrices: Sequence[NDArray[np.float64]]
 ) -> CameraInfo:
     (width, height), (k, r, p) = size, matrices
-    header = Header(stamp=_NO_TIME, frame_id="")
+    header = Header(stamp=NO_STAMP, frame_id="")
     return CameraInfo(header, height, width, model, distortion, k, r, p, binning_x=0, binning_y=0, roi=_WHOLE)
 
 

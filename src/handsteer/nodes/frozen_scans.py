@@ -5,9 +5,8 @@ import math
 import numpy as np
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.messages import LaserScan, Pose, Time
+from handsteer.messages import NO_STAMP, LaserScan, Pose
 
-_NO_STAMP = Time(0, 0)
 _MOVED_M, _TURNED_RAD = 0.1, 0.1
 # Walls that are parallel to a straight way look the same all along it; at this angle and distance nothing can be one.
 _AHEAD_RAD, _NEAR_M = math.radians(5), 4.0
@@ -38,7 +37,7 @@ class FrozenScans:
         if before is None or self._since is None or not _is_same(before, scan):
             self._since = self._pose
             return False, False
-        is_again = before.header.stamp == scan.header.stamp != _NO_STAMP
+        is_again = before.header.stamp == scan.header.stamp != NO_STAMP
         if self._pose is None or is_again:
             return True, False
         moved_m = math.dist(_place(self._pose), _place(self._since))

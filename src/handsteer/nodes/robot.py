@@ -13,6 +13,7 @@ from handsteer.messages import (
     CLOCK,
     CMD_VEL,
     JOINT_STATES,
+    NO_STAMP,
     ODOM,
     ROBOT_DESCRIPTION,
     SCAN,
@@ -28,7 +29,6 @@ from handsteer.messages import (
     Quaternion,
     String,
     TFMessage,
-    Time,
     Topic,
     Transform,
     TransformStamped,
@@ -60,7 +60,6 @@ _DIAGNOSE_PERIOD_S = 0.1
 _LONGEST_STEP_S = 0.1
 # No robot moves so far within a period: it was moved by hand, or its odometry was reset.
 _LEAP_M = 0.5
-_NO_STAMP = Time(sec=0, nanosec=0)
 
 # Variances of x, y, z, roll, pitch and yaw, in m² and rad²: wheels measure only the motion in the plane.
 _COVARIANCE = np.diag([0.001, 0.001, 1e6, 1e6, 1e6, 0.01]).reshape(-1)
@@ -160,8 +159,8 @@ class RobotNode(Node):
 
     def _is_old(self, message: Twist | TwistStamped, now: float) -> bool:
         """Return whether a stamped command is too old to be obeyed, as in ROS's diff_drive_controller."""
-        stamp = message.header.stamp if isinstance(message, TwistStamped) else _NO_STAMP
-        age_s = 0.0 if stamp == _NO_STAMP else now - self.clock.time_of(stamp)
+        stamp = message.header.stamp if isinstance(message, TwistStamped) else NO_STAMP
+        age_s = 0.0 if stamp == NO_STAMP else now - self.clock.time_of(stamp)
         is_old = age_s > self._config.cmd_vel_timeout
         if is_old and not self._hears_old:
             log.warning("a command that was stamped %.1f s ago is not obeyed: do the clocks of both ends agree?", age_s)

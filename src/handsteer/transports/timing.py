@@ -6,9 +6,7 @@ from collections import OrderedDict
 from typing import Any
 
 from handsteer.clock import Clock, ClockWatch, SimulatedClock, to_seconds
-from handsteer.messages import Time
-
-_NO_STAMP = Time(sec=0, nanosec=0)
+from handsteer.messages import NO_STAMP, Time
 
 # A sender's clock that is set back by a second is trusted again after a minute and a half; delays are shorter.
 _LEAK = 0.01
@@ -25,7 +23,7 @@ def capture_time(message: Any, clock: Clock) -> float | None:
     It is in the future if another machine's clock is ahead of ours.
     """
     header = getattr(message, "header", None)
-    if header is None or header.stamp == _NO_STAMP:
+    if header is None or header.stamp == NO_STAMP:
         return None
     return clock.time_of(header.stamp)
 
@@ -41,7 +39,7 @@ class Repeats:
 
     def has(self, stamp: Time, now_s: float) -> bool:
         """Return whether a message that arrives at ``now_s`` has no newer stamp; one without a stamp always counts."""
-        if stamp == _NO_STAMP:
+        if stamp == NO_STAMP:
             return False
         stamp_s = to_seconds(stamp)
         advanced_s = stamp_s - self._stamp_s

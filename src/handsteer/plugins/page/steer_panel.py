@@ -138,8 +138,9 @@ class SteerPanel:
 
     def _keep_sliders(self, sent: object) -> None:
         touched = sent.get("touched") if isinstance(sent, dict) else None
-        for wanted in self._input.keep_sliders(_sent_ms(sent), touched, time.monotonic()) or (None,):
+        for wanted in self._input.keep_sliders(_sent_ms(sent), touched, time.monotonic()):
             self._steer(wanted)
+        self._show_sliders()
 
     def _slide(self) -> None:
         wanted = Velocity(self._linear.value, self._angular.value)

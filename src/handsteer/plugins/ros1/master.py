@@ -152,14 +152,14 @@ class SystemState:
 
         What it answered in the last half second counts: a process subscribes to many topics at once.
         """
-        with self._lock:
-            if time.monotonic() - self._asked[0] > _ANSWER_HOLDS_S:
-                try:
-                    publishers = Master(rosgraph.get_master_uri()).publishers(rospy.get_name())
-                except TransportError:
-                    return None
-                self._asked = time.monotonic(), publishers
-            return set(self._asked[1].get(topic, []))
+        asked_s, publishers = self._asked
+        if time.monotonic() - asked_s > _ANSWER_HOLDS_S:
+            try:
+                publishers = Master(rosgraph.get_master_uri()).publishers(rospy.get_name())
+            except TransportError:
+                return None
+            self._asked = time.monotonic(), publishers
+        return set(publishers.get(topic, []))
 
     def publishers_of(self, topic: str) -> list[str]:
         """Return the nodes that publish the topic of this full name; empty until the master has replied."""
