@@ -96,7 +96,6 @@ def test_the_default_is_short_and_all_is_more(monkeypatch: pytest.MonkeyPatch) -
         (("--latency", "-1"), "latency in ms: -1 should be from 0 to 5000"),
         (("--sweep", "speed=1"), "factors: latency, fps, errors, reaction"),
         (("--json", "/nowhere/laps.json"), "there is no folder /nowhere"),
-        (("--json", "README.md"), "--json: README.md exists, and is not such a file: give another name, or move it"),
     ],
 )
 def test_wrong_options_end_with_code_2(
@@ -105,3 +104,12 @@ def test_wrong_options_end_with_code_2(
     code, out, err = run(capsys, *words)
     assert (code, out) == (2, "")
     assert message in err
+
+
+def test_another_kind_of_file_is_not_overwritten(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    recording = tmp_path / "drive.mcap"
+    recording.write_bytes(b"\x89MCAP0\r\n")
+    code, out, err = run(capsys, "--json", str(recording))
+    assert (code, out) == (2, "")
+    assert f"--json: {recording} exists, and is not such a file: give another name, or move it away" in err
+    assert recording.read_bytes() == b"\x89MCAP0\r\n"
