@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handsteer.errors import TransportError
-from handsteer.messages import Image, Topic
+from handsteer.messages import STOP, STOPPED, Image, Topic
 from handsteer.nodes.base import Node
 from handsteer.testing.transport_contract import SessionContract, eventually
 from handsteer.transports import join
@@ -66,6 +66,12 @@ class TestRos1(SessionContract):
         camera.kill()
         # It is 1.3 s for a callback of the transport; a fresh one is at most as old as one callback is long, 0.1 s.
         assert float(np.median(ages_s)) < 0.7, ages_s
+
+    def test_a_node_that_has_subscribed_to_stop_knows_at_once_who_reports_stops(self, transport: Transport) -> None:
+        """Until it knows, a control follows no sign; the master is polled every four seconds."""
+        transport.advertise("early", STOPPED)
+        transport.subscribe("early", STOP, lambda received: None)
+        assert transport.publishers_of(STOPPED) == ["/tests"]
 
     def test_a_process_has_one_name(self, session: Session) -> None:
         with pytest.raises(TransportError, match=r"is the ROS node /tests already.*one a process.*process of its own"):

@@ -3,11 +3,9 @@
 import errno
 import http.client
 import logging
-import math
 import select
 import socket
 import threading
-import time
 import urllib.parse
 import xmlrpc.client
 from typing import Any
@@ -132,7 +130,6 @@ class _ImpatientTransport(xmlrpc.client.Transport):
 
 
 _PERIOD_S = 4.0
-_ANSWER_HOLDS_S = 0.5
 
 log = logging.getLogger(__name__)
 
@@ -145,20 +142,14 @@ class SystemState:
         self._thread: threading.Thread | None = None
         self._closed = threading.Event()
         self._publishers: dict[str, list[str]] = {}
-        self._asked: tuple[float, dict[str, list[str]]] = (-math.inf, {})
 
     def publishers_before(self, topic: str) -> set[str] | None:
-        """Ask the master which nodes publish the topic of this full name; None if it does not answer.
-
-        What it answered in the last half second counts: a process subscribes to many topics at once.
-        """
-        asked_s, publishers = self._asked
-        if time.monotonic() - asked_s > _ANSWER_HOLDS_S:
-            try:
-                publishers = Master(rosgraph.get_master_uri()).publishers(rospy.get_name())
-            except TransportError:
-                return None
-            self._asked = time.monotonic(), publishers
+        """Ask the master which nodes publish the topic of this full name; None if it does not answer."""
+        try:
+            publishers = Master(rosgraph.get_master_uri()).publishers(rospy.get_name())
+        except TransportError:
+            return None
+        self._keep(publishers)  # a node that starts need not wait for the first poll
         return set(publishers.get(topic, []))
 
     def publishers_of(self, topic: str) -> list[str]:
@@ -183,6 +174,9 @@ class SystemState:
             except TransportError as error:
                 log.debug("%s", error)  # the session reports it, and ends the node
             else:
-                with self._lock:
-                    self._publishers = {} if self._closed.is_set() else publishers
+                self._keep(publishers)
             self._closed.wait(_PERIOD_S)
+
+    def _keep(self, publishers: dict[str, list[str]]) -> None:
+        with self._lock:
+            self._publishers = {} if self._closed.is_set() else publishers
