@@ -43,10 +43,11 @@ def test_an_empty_file_is_an_empty_world(tmp_path: Path) -> None:
     assert load_world(path) == rename(load_world("empty"), "mine")
 
 
-def test_an_unknown_name_lists_the_known_ones() -> None:
+@pytest.mark.parametrize("name", ["moon", ""])
+def test_an_unknown_name_lists_the_known_ones(name: str) -> None:
     names = ", ".join(shipped_worlds())
-    with pytest.raises(WorldError, match=rf"no world 'moon': use {names}, or the path of a \.yaml file"):
-        load_world("moon")
+    with pytest.raises(WorldError, match=rf"no world '{name}': use {names}, or the path of a \.yaml file"):
+        load_world(name)
 
 
 @pytest.mark.parametrize(

@@ -174,7 +174,7 @@ def load_world(name_or_path: str | Path) -> World:
     if name in shipped_worlds():
         return read_world(_SHIPPED / f"{name}.yaml")
     path = Path(name_or_path)
-    if path.suffix in (".yaml", ".yml") or path.exists():
+    if name and (path.suffix in (".yaml", ".yml") or path.exists()):
         return read_world(path)
     known = shipped_worlds()
     near = did_you_mean(name, known)

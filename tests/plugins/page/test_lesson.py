@@ -172,6 +172,7 @@ def test_signs_are_renamed_and_left_out_with_their_takes(lesson: Lesson) -> None
         ("", "'' is not a valid name for a sign"),
         ("turn left", "Turn Left is known already: give the new sign a name of its own"),
         ("none", "NONE is known already"),
+        ("background", "background is known already"),
         ("PEACE", "there is a sign Peace already"),
         ("x" * 41, "is not a valid name for a sign"),
         ("Hi\x07", "is not a valid name for a sign"),

@@ -23,6 +23,7 @@ MOST_HANDS: Final = 100_000
 LONGEST_HOLD_S: Final = 10.0
 """Maximum duration of a take that is recorded while a button is held."""
 _MOST_UNDO: Final = 50
+_TITLE_OF_NONE: Final = "background"
 _TOO_FEW: Final = "Too few hands were seen: this take does not count."
 _ADDED: Final = "The takes of the file are here: press Train, then try them."
 _ADDED_READY: Final = "The signs of the file are here: try them, then keep them."
@@ -246,7 +247,7 @@ class Lesson:
         if not but and len(taken) >= MOST_CLASSES:
             raise DatasetError(f"there are {MOST_CLASSES} classes already: delete one first")
         label = label_for(name, taken)
-        if label in (*SIGNS, NONE):
+        if label in (*SIGNS, NONE) or label.casefold() == _TITLE_OF_NONE:
             raise DatasetError(f"{label} is known already: give the new sign a name of its own")
         if label in taken:
             raise DatasetError(f"there is a sign {label} already: record more takes of that, or choose another name")
