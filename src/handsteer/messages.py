@@ -137,7 +137,8 @@ def is_stopping(sign: String) -> bool:
 
 def is_released(message: Joy) -> bool:
     """Return whether the hand drives neither as a joystick nor by pointing."""
-    return not (stick_in(message).held or pointing_in(message).held)
+    sticks = stick_in(message), pointing_in(message)  # another recogniser's may lack the second
+    return not any(stick.held and stick.is_valid for stick in sticks)
 
 
 # The functions of topics are not lambdas, so that a topic can be pickled for another process.

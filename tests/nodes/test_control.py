@@ -34,6 +34,7 @@ from handsteer.messages import (
     Twist,
     TwistWithCovariance,
     cmd_vel,
+    is_released,
     joy_of,
     stick_in,
     twist,
@@ -784,6 +785,22 @@ def test_axes_beyond_one_are_full_deflection() -> None:
     bench = ControlBench(JOYSTICK)
     bench.hold(RELEASED, Stick(held=True, forward=50.0, left=-1e30))
     assert bench.last() == (1, -2)
+
+
+@pytest.mark.parametrize(
+    ("axes", "buttons", "is_release"),
+    [
+        ([0.0, 0.0], [0], True),  # of a recogniser that knows no pointing
+        ([0.0, 1.0], [1], False),
+        ([0.0, 0.0, 0.5, 1.0], [0, 0, 1], False),
+        ([0.0, 0.0, 0.0, 0.0], [0, 0, 0], True),
+    ],
+)
+def test_a_hand_that_neither_holds_nor_points_is_released(
+    axes: list[float], buttons: list[int], is_release: bool
+) -> None:
+    message = Joy(header=HEADER, axes=np.array(axes, np.float32), buttons=np.array(buttons, np.int32))
+    assert is_released(message) == is_release
 
 
 def test_signs_do_not_drive_in_the_mode_of_the_joystick_nor_the_joystick_in_that_of_signs() -> None:

@@ -87,7 +87,7 @@ def publish(order: dict[str, Any]) -> bool:
         *path, last = field.split(".")
         part = reduce(getattr, path, message)
         kind = getattr(part, last)
-        setattr(part, last, rospy.Time.from_sec(value) if isinstance(kind, rospy.Time) else value)
+        setattr(part, last, rospy.Time.from_sec(value) if hasattr(kind, "to_sec") else value)
     for _ in range(order.get("count", 1)):
         publisher.publish(message)
         time.sleep(order.get("period_s", 0.0))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handsteer.errors import TransportError
-from handsteer.messages import STOP, STOPPED, Image, Topic
+from handsteer.messages import GESTURE_JOY, STOP, STOPPED, Image, Joy, Topic
 from handsteer.nodes.base import Node
 from handsteer.testing.transport_contract import SessionContract, eventually
 from handsteer.transports import join
@@ -72,6 +72,32 @@ class TestRos1(SessionContract):
         transport.advertise("early", STOPPED)
         transport.subscribe("early", STOP, lambda received: None)
         assert transport.publishers_of(STOPPED) == ["/tests"]
+
+    def test_a_hand_that_a_link_has_held_back_is_late_whatever_the_clock_of_its_machine_says(
+        self, graph: Ros1Graph, transport: Transport
+    ) -> None:
+        came: list[tuple[float, bool]] = []
+
+        def note(received: Received[Joy]) -> None:
+            came.append((received.message.axes[1], received.is_late))
+
+        transport.subscribe("listener", GESTURE_JOY, note)
+        hand = graph.peer("__name:=hand_elsewhere")
+        hand.ask("advertise", topic="/gesture/joy", package="sensor_msgs", type="Joy")
+        assert eventually(lambda: hand.ask("listeners", topic="/gesture/joy") > 0)
+
+        def show(forward: float, *, held: bool, delay_s: float) -> None:
+            stamp_s = time.time() + 60.0 - delay_s
+            values = {"axes": [0.0, forward], "buttons": [int(held)], "header.stamp": stamp_s}
+            hand.ask("publish", topic="/gesture/joy", values=values)
+
+        show(0.5, held=True, delay_s=0.0)
+        assert eventually(lambda: came == [(0.5, False)])
+        show(0.75, held=True, delay_s=0.8)
+        show(0.0, held=False, delay_s=0.8)
+        assert eventually(lambda: came[1:] == [(0.0, True)]), came
+        show(1.0, held=True, delay_s=0.0)
+        assert eventually(lambda: came[2:] == [(1.0, False)])
 
     def test_a_process_has_one_name(self, session: Session) -> None:
         with pytest.raises(TransportError, match=r"is the ROS node /tests already.*one a process.*process of its own"):

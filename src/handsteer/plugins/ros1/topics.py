@@ -23,7 +23,7 @@ from handsteer.plugins.ros1.master import SystemState
 from handsteer.timeouts import HEAR_STOP_S
 from handsteer.transports.base import Deliver, Received
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
-from handsteer.transports.timing import capture_time
+from handsteer.transports.timing import StaleMessageFilter, capture_time
 
 M = TypeVar("M")
 
@@ -94,16 +94,22 @@ class Ros1Transport(BaseTransport):
         size = _BUFFER_BYTES.get(kind, _SMALL_BUFFER_BYTES)
 
         def receive(send: Deliver[M]) -> Callable[[], None]:
-            kept = _Kept(self._state.publishers_before(name)) if topic.stops is not None else None
+            stops = topic.stops
+            kept = _Kept(self._state.publishers_before(name)) if stops is not None else None
+            stale = None if topic.lifespan_s is None else StaleMessageFilter(topic.lifespan_s)
 
             def on_message(theirs: Any) -> None:
                 message = from_ros1(theirs, kind)
                 captured_s = capture_time(message, self._clock)
-                if kept is not None and kept.has(theirs):
-                    if topic.stops is not None and topic.stops(message):
-                        send(Received(message, captured_s, is_late=True))
-                    return
-                send(Received(message, captured_s, by_player=captured_s is not None and _is_player(theirs)))
+                is_kept = kept is not None and kept.has(theirs)
+                by_player = captured_s is not None and _is_player(theirs)
+                is_late = False
+                if stale is not None and captured_s is not None and not by_player:  # ROS 1 has no times of sending
+                    is_late = stale.is_late(_sender(theirs).encode(), captured_s, self._clock.now())
+                if not (is_kept or is_late):
+                    send(Received(message, captured_s, by_player=by_player))
+                elif stops is not None and stops(message):
+                    send(Received(message, captured_s, is_late=True))
 
             is_image = size > _SMALL_BUFFER_BYTES
             if is_image:
@@ -120,7 +126,11 @@ class Ros1Transport(BaseTransport):
 
 def _is_player(theirs: Any) -> bool:
     """Return whether ``rosbag play`` sent a message: its nodes are always called play and the time."""
-    return _PLAYER.fullmatch(_header(theirs).get("callerid", "")) is not None
+    return _PLAYER.fullmatch(_sender(theirs)) is not None
+
+
+def _sender(theirs: Any) -> str:
+    return _header(theirs).get("callerid", "")
 
 
 def _header(theirs: Any) -> Mapping[str, str]:
@@ -142,8 +152,7 @@ class _Kept:
 
     def has(self, theirs: Any) -> bool:
         """Return whether a message is one of these; each has to be asked for, once."""
-        header = _header(theirs)
-        publisher, latches = header.get("callerid", ""), header.get("latching") == "1"
+        publisher, latches = _sender(theirs), _header(theirs).get("latching") == "1"
         if self._waits is None:
             return latches and time.monotonic() < self._until_s
         if publisher not in self._waits:
