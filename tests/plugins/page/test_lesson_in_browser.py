@@ -135,6 +135,9 @@ COUNT_CLICKS = (
 )
 
 
+WIDER = """[...document.querySelectorAll(".class .buttons")]
+    .filter((row) => row.scrollWidth > row.clientWidth + 1).map((row) => row.innerText)"""
+"""The rows of a card's buttons that are wider than the card."""
 LANGUAGES = {"en-US": {words: words for words in GERMAN}, "de-DE": GERMAN}
 
 
@@ -162,6 +165,7 @@ def test_a_teachers_sign_drives_in_eight_clicks(
         page.locator(".class.own").nth(1).wait_for()  # next to that of the background
         click("2 timed takes")
         page.locator(".class.own").first.locator(".take").nth(1).wait_for()
+        assert page.evaluate(WIDER) == []
         click("Train")
         page.locator(".recalls li", has_text="Zwei").wait_for(timeout=TRAINING_MS)
         click("forward")
@@ -287,6 +291,7 @@ def test_one_teaches_at_a_time_while_the_robot_stands(visit: Visit, tmp_path: Pa
     first.get_by_label("Name of the sign").fill("Forward")
     press(visit, "Add the sign")
     first.locator(".tools .message", has_text="Forward is known already").wait_for()
+    assert first.get_by_label("Name of the sign").input_value() == "Forward"
     assert visit.text(".banner .headline") == "Stopped"
 
     second = visit.another_page()
