@@ -231,7 +231,7 @@ class ClockWatch:
         self._in_step = in_step
         self.set_by_s = 0.0
         self._correction_s = 0.0
-        self._last: tuple[float, float] | None = None
+        self._trusted: tuple[float, float] | None = None
         self._watched: tuple[float, float] | None = None
 
     def corrected(self, age_s: float, now_s: float) -> float | None:
@@ -241,17 +241,20 @@ class ClockWatch:
             age_s: Time of arrival minus that of the stamp, in seconds, on any two clocks.
             now_s: Time of arrival, in seconds of a monotonic clock.
         """
-        last, self._last = self._last, (age_s, now_s)
-        if last is not None and self._watched is None and self._was_set(*last, age_s, now_s):
-            self._watched, self.set_by_s = (age_s, now_s), age_s - last[0]
         if self._watched is not None:
             first_age_s, since_s = self._watched
             if abs(age_s - first_age_s) > STALE_S:  # a single late message, not the clock
                 self._watched = None
             elif now_s - since_s >= RESYNC_S:
                 self._correction_s += self.set_by_s
-                self._watched = None
-        return None if self._watched is not None else age_s - self._correction_s
+                self._watched = self._trusted = None
+        # What broke off a measurement is compared with the last trusted message, not with one that may be wrong itself.
+        if self._watched is None and self._trusted is not None and self._was_set(*self._trusted, age_s, now_s):
+            self._watched, self.set_by_s = (age_s, now_s), age_s - self._trusted[0]
+        if self._watched is not None:
+            return None
+        self._trusted = (age_s, now_s)
+        return age_s - self._correction_s
 
     def _was_set(self, last_age_s: float, last_s: float, age_s: float, now_s: float) -> bool:
         set_back_s = age_s - last_age_s - (now_s - last_s)

@@ -140,6 +140,24 @@ def test_a_queue_that_stood_still_is_no_clock_that_was_set() -> None:
     assert all(why is not None and why.startswith("frames come 5.0 s after their stamp") for why in late)
 
 
+ODD_S = st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=10)
+
+
+@given(ODD_S)
+def test_after_frames_with_odd_stamps_good_ones_count_soon_and_old_ones_never(odd_s: list[float]) -> None:
+    """The odd ones may be what a broken driver or a hostile publisher sends between those of the camera."""
+    age = FrameAge(LIMIT_S)
+    delays_s = [0.01] * 30 + odd_s + [0.01] * 60
+    told = [
+        (delay_s, age.why_refused(1000.0 + number * PERIOD_S, 1000.0 + number * PERIOD_S - delay_s))
+        for number, delay_s in enumerate(delays_s)
+    ]
+    assert told[-1][1] is None
+    assert all(why is not None for delay_s, why in told if delay_s > 2 * LIMIT_S)
+    late = age.why_refused(1020.0, 1012.0)
+    assert late is not None
+
+
 DAYS_S = 3 * 86_400.0
 
 
