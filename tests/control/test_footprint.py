@@ -66,6 +66,9 @@ def test_what_is_within_the_robot_is_a_part_of_it() -> None:
         scan_of(1.0, angle_min=math.inf),
         scan_of(1.0, range_max=math.nan),
         scan_of(1.0, range_max=-1.0),
+        scan_of(0.45, 0.45, range_min=10.0, range_max=0.1),
+        scan_of(0.45, 0.45, angle_min=1e30),
+        scan_of(0.45, 0.45, angle_increment=1e30),
     ],
 )
 def test_a_scan_that_says_nothing_is_none(scan: LaserScan) -> None:

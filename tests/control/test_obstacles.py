@@ -89,6 +89,15 @@ def test_nothing_drives_on_towards_what_is_within_the_margin(forward: float, gap
     assert speed(Velocity(-forward, 0.0), -wall_ahead(gap_m)) == 0.0
 
 
+@pytest.mark.parametrize("deceleration", [0.1, 1e-3, 1e-200])
+@pytest.mark.parametrize("gap_m", [0.5, 0.75, 1.0, 1.75, 2.0, 3.25, 4.25, 7.5])
+def test_nothing_is_fast_enough_to_leap_over_a_wall(gap_m: float, deceleration: float) -> None:
+    rule = RULE.model_copy(update={"deceleration": deceleration})
+    for moving in (ZERO, Velocity(10.0, 0.0), Velocity(25.0, 0.0)):
+        linear_mps = limit(Velocity(10.0, 0.0), wall_ahead(gap_m), rule, moving)[0].linear_mps
+        assert linear_mps**2 <= 2 * deceleration * gap_m
+
+
 @pytest.mark.parametrize("gap_m", [0.3, 0.5, 0.8, 1.2])
 def test_the_speed_is_the_one_that_stops_in_time(gap_m: float) -> None:
     linear_mps = speed(Velocity(2.0, 0.0), wall_ahead(gap_m))

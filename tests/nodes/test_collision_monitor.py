@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, RobotConfig
+from handsteer.control.obstacles import ObstacleLimiter
 from handsteer.messages import (
     CMD_VEL,
     DIAGNOSTICS,
@@ -229,6 +230,44 @@ def test_how_fast_the_robot_is_it_hears_from_odometry(says: list[Odometry], *, i
         bench.show("Turn Left", 1, ahead(0.57))
         told.append(bench.command[0])
     assert (told[0] < told[1]) == is_slower
+
+
+@pytest.mark.parametrize("linear_mps", [1000.0, -1000.0, 26.0, 1e200, -1e308, math.inf])
+def test_odometry_that_no_robot_has_counts_as_none(linear_mps: float) -> None:
+    """For example in mm/s. It made the braking way so long that the steps along it led over the wall."""
+    bench = MonitorBench(control=ControlConfig(linear_step=0.1))
+    publisher = bench.transport.advertise("robot", ODOM)
+    publisher.publish(odometry(0.0))
+    bench.show("Forward", 8, ahead(7.0))
+    assert bench.command[0] > 0.5
+    for _ in range(30):
+        message = odometry(linear_mps)
+        message.header.stamp = bench.clock.stamp(2.0 + bench.clock.now())
+        publisher.publish(message)
+        bench.show("Forward", 1, ahead(0.5))
+    assert bench.command == (0.0, 0.0)
+    assert bench.report()[0].endswith("(the robot's odometry has stopped)")
+
+
+def test_a_collision_monitor_that_fails_stops_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = MonitorBench(arming=True)
+    bench.show("Stop", 40, ahead(7.0))
+    bench.show("Forward", 10, ahead(7.0))
+    assert bench.command[0] > 0.0
+
+    def fail(*_args: object) -> None:
+        raise OverflowError("(34, 'Numerical result out of range')")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(ObstacleLimiter, "limit", fail)
+        bench.show("Forward", 10, ahead(7.0))
+        assert bench.command == (0.0, 0.0)
+    bench.show("Forward", 10, ahead(7.0))
+    assert bench.command == (0.0, 0.0)
+    assert bench.report()[0].endswith("to begin (the collision monitor has failed)")
+    bench.show("Stop", 1, ahead(7.0))
+    bench.show("Forward", 1, ahead(7.0))
+    assert bench.command[0] > 0.0
 
 
 def test_several_robots_are_refused() -> None:

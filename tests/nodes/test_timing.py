@@ -140,6 +140,16 @@ def test_a_queue_that_stood_still_is_no_clock_that_was_set() -> None:
     assert all(why is not None and why.startswith("frames come 5.0 s after their stamp") for why in late)
 
 
+def test_a_wrong_stamp_is_not_compared_with_another_wrong_one() -> None:
+    """After two, 3 and 8 s ahead, a good frame looked like one of a clock that was set back by 8 s."""
+    age = FrameAge(LIMIT_S)
+    for number in range(60):
+        now_s = 1000.0 + number * PERIOD_S
+        why = age.why_refused(now_s, now_s - {30: -3.0, 31: -8.0}.get(number, 0.01))
+        assert (why is None) == (number not in (30, 31))
+    assert age.why_refused(1010.0, 1002.0) is not None
+
+
 ODD_S = st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=10)
 
 

@@ -21,6 +21,9 @@ _SKIN_M = 0.05
 
 _STRAIGHT_RADPS = 1e-9
 
+# Three turns; scanners make one at most, from any direction.
+_MOST_RAD = 6 * math.pi
+
 
 def gaps(x: Array, y: Array, rule: CollisionMonitorConfig) -> Array:
     """Return the distances of points from the footprint, in metres; negative inside it.
@@ -160,7 +163,9 @@ def points_of(scan: LaserScan, rule: CollisionMonitorConfig) -> Points | None:
     """
     ranges = np.asarray(scan.ranges, dtype=np.float64).reshape(-1)
     figures = (scan.angle_min, scan.angle_increment, scan.range_min, scan.range_max)
-    if not all(map(math.isfinite, figures)) or not scan.angle_increment or scan.range_max <= 0:
+    if not all(map(math.isfinite, figures)) or not scan.angle_increment or scan.range_max <= max(0.0, scan.range_min):
+        return None
+    if max(abs(scan.angle_min), abs(scan.angle_increment) * len(ranges)) > _MOST_RAD:
         return None
     touches = np.isneginf(ranges)
     found = (ranges >= max(0.0, scan.range_min)) & (ranges <= scan.range_max) & (ranges > 0)

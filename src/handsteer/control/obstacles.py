@@ -47,6 +47,8 @@ _GLANCING = 0.05
 _CREEP_M = 0.06
 _STEP_M = 0.03
 _FEWEST_STEPS, _MOST_STEPS = 8, 400
+# Of longer ways the end is left out: with longer steps, the robot would step over a wall.
+_LONGEST_STEP_M = 0.1
 # Only every third pose is checked: the others are within two steps of one, slightly more by rounding of the summed
 # poses.
 _ROUGHLY = 2.1
@@ -137,7 +139,7 @@ def _within_reach(
     far_m = way_m + rule.margin + _CREEP_M + reach_m(rule) + pad_m
     x, y = points[:, 0], points[:, 1]
     if drift is None or not drift.any():
-        return points[x * x + y * y <= far_m**2], None
+        return points[x * x + y * y <= far_m * far_m], None
     comes_m = np.linalg.norm(drift, axis=1) * (rule.reaction_time + _braking_s(highest, rule))
     near = x * x + y * y <= (far_m + comes_m) ** 2
     return points[near], drift[near] if drift[near].any() else None
@@ -212,12 +214,15 @@ def _met_while_braking(
 
 
 def steps_s(fastest_mps: float, seconds: float) -> Points:
-    """Return times from 0 to ``seconds``, (K,), between which the fastest corner moves by 3 cm, or more if it is far.
+    """Return times from 0 on, (K,), between which the fastest corner moves by 3 cm; by up to 10 cm if it is far.
+
+    They end at ``seconds``, or after 40 m.
 
     Args:
         fastest_mps: Speed of the fastest corner, above 0; plus that of what comes, if anything moves.
         seconds: The last of them, above 0.
     """
+    seconds = min(seconds, _MOST_STEPS * _LONGEST_STEP_M / fastest_mps)
     steps = min(max(math.ceil(fastest_mps * seconds / _STEP_M), _FEWEST_STEPS), _MOST_STEPS)
     return np.arange(steps + 1, dtype=np.float64) * (seconds / steps)
 

@@ -17,6 +17,15 @@ from handsteer.transports.base import Received
 from handsteer.transports.timing import Repeats
 from handsteer.types import Velocity
 
+# Above all limits that can be configured: it is in other units, or wrong.
+_FASTEST = Velocity(25.0, 60.0)
+_NOT_VALID = Velocity(math.nan, math.nan)
+
+
+def _is_finite(pose: Pose) -> bool:
+    at, turned = pose.position, pose.orientation
+    return all(map(math.isfinite, (at.x, at.y, at.z, turned.x, turned.y, turned.z, turned.w)))
+
 
 class MeasuredVelocity:
     """Reads velocities from odometry, including sources that leave the twist at zero while the pose changes."""
@@ -25,10 +34,15 @@ class MeasuredVelocity:
         self._pose: Pose | None = None
 
     def read(self, odometry: Odometry) -> Velocity | None:
-        """Return the robot's velocity; None if it moves but its twist does not give the velocity."""
+        """Return the robot's velocity; None if it moves but its twist does not give the velocity.
+
+        One that no robot has, above 25 m/s or 60 rad/s, is not finite.
+        """
         twist, pose = odometry.twist.twist, odometry.pose.pose
         velocity = Velocity(twist.linear.x, twist.angular.z)
-        has_moved, self._pose = self._pose not in (None, pose), pose
+        if velocity != velocity.clamped(_FASTEST.linear_mps, _FASTEST.angular_radps):
+            return _NOT_VALID
+        has_moved, self._pose = self._pose not in (None, pose) and _is_finite(pose), pose
         return None if velocity.is_zero and has_moved else velocity
 
 

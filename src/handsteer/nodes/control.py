@@ -354,7 +354,14 @@ class HandSignControlNode(Node):
     def _publish(self, velocity: Velocity | None, captured_s: float | None = None) -> None:
         if velocity is None or not self.is_active:
             return
-        self._commanded = self._monitor.admit(velocity)
+        try:
+            self._commanded = self._monitor.admit(velocity)
+        except Exception:
+            self._safety.stall("the collision monitor has failed")
+            self._control.halt()
+            self._commanded = ZERO
+            self._cmd_vel.send(0.0, 0.0, captured_s)
+            raise
         self._cmd_vel.send(self._commanded.linear_mps, self._commanded.angular_radps, captured_s)
         if captured_s is not None:
             self.latency.add(self.clock.now() - captured_s)

@@ -98,7 +98,7 @@ def _near(wanted: Velocity, way_m: float, around: Around) -> Around:
     far_m = max(way_m, fastest.linear_mps * LOOK_S) + reach + PAD_M + _PAD_S * fastest_mps(fastest, around.rule)
     x, y = points[:, 0] * math.copysign(1.0, wanted.linear_mps), points[:, 1]
     if around.drift is None:
-        return replace(around, points=points[(x * x + y * y <= far_m**2) & (x >= -reach - PAD_M)])
+        return replace(around, points=points[(x * x + y * y <= far_m * far_m) & (x >= -reach - PAD_M)])
     comes_m = np.linalg.norm(around.drift, axis=1) * _LONGEST_S
     near = (x * x + y * y <= (far_m + comes_m) ** 2) & (x >= -reach - PAD_M - comes_m)
     return replace(around, points=points[near], drift=around.drift[near])
