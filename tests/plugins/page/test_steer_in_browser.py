@@ -138,6 +138,56 @@ def test_letters_drive_wherever_the_focus_is_and_the_plot_shows_it(visit: Visit)
     assert visit.troubles == []
 
 
+def test_a_key_or_pad_is_let_go_where_the_browser_does_not_say_so(visit: Visit) -> None:
+    """It shows no menu while something is held, and what it takes with one, or while something is dragged, ends."""
+    page = visit.page
+    take_seat(visit)
+    page.locator(".pad").scroll_into_view_if_needed()
+    pad = page.locator(".pad").bounding_box()
+    assert pad is not None
+    x, y = pad["x"] + pad["width"] / 2, pad["y"] + 6
+
+    def press() -> bool:
+        page.mouse.move(x, y)
+        page.mouse.up()
+        page.mouse.down()
+        page.wait_for_timeout(300)
+        return speed(visit) > 0.1
+
+    visit.wait_until(press)
+    page.evaluate("addEventListener('contextmenu', (event) => (window.menu = !event.defaultPrevented))")
+    page.mouse.down(button="right")
+    assert page.evaluate("window.menu") is False
+    page.mouse.up(button="left")  # the right one is still held
+    visit.wait_until(lambda: stands(visit))
+    page.mouse.up(button="right")
+    page.mouse.click(x, y, button="right")
+    assert page.evaluate("window.menu") is True
+
+    def type_w() -> bool:
+        page.keyboard.up("KeyW")
+        page.keyboard.down("KeyW")
+        page.wait_for_timeout(300)
+        return speed(visit) > 0.1
+
+    visit.wait_until(type_w)
+    page.locator("a").first.dispatch_event("dragstart")
+    visit.wait_until(lambda: stands(visit))
+
+    def repeat_w() -> bool:
+        type_w()
+        for _ in range(10):
+            page.keyboard.down("KeyW")  # as the system repeats it, until a menu of the browser opens
+            page.wait_for_timeout(30)
+        return speed(visit) > 0.1
+
+    visit.wait_until(repeat_w)
+    visit.wait_until(lambda: stands(visit))
+    visit.wait_until(type_w)
+    assert drives_on(visit, 1.0), "a system that does not repeat keys"
+    assert visit.troubles == []
+
+
 def test_a_key_that_is_held_over_a_reload_or_before_the_seat_has_to_be_pressed_again(visit: Visit) -> None:
     def repeat(page: Page) -> None:
         for _ in range(15):

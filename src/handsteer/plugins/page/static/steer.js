@@ -1,6 +1,7 @@
 // What needs the browser: how long the pad or a key is held, and whether the page is in front.
 
 const REPEAT_MS = 100; // the server stops the robot after 300 ms without a message
+const KEY_REPEATS_MS = 500; // systems repeat a key every 30 ms or so, once they have begun to
 const KEYS = {
   ArrowUp: [0, 1], KeyW: [0, 1], ArrowDown: [0, -1], KeyS: [0, -1],
   ArrowLeft: [-1, 0], KeyA: [-1, 0], ArrowRight: [1, 0], KeyD: [1, 0],
@@ -11,6 +12,9 @@ const TYPED_IN = "input, textarea, select, [contenteditable]";
 // a function to follow it, which is called before each message.
 let held = null;
 const pressed = new Set();
+// The key that the system repeats, and when it did: a menu of the browser takes the keys without a word, also keyup.
+let repeating = null;
+let repeatedAt = 0;
 
 // A message that cannot be sent now must not be sent later. The clock is the wall clock, which runs on in standby.
 function say(name, what = {}) {
@@ -33,6 +37,7 @@ function hold(pad, x, y, follow) {
 
 function sayHeld() {
   held.follow?.();
+  if (pressed.has(repeating) && performance.now() - repeatedAt > KEY_REPEATS_MS) releasePad();
   if (held) say("pad_held", { x: held.x, y: held.y });
 }
 
@@ -86,7 +91,9 @@ document.addEventListener("pointerdown", (event) => {
 });
 document.addEventListener("pointermove", (event) => {
   const pad = event.target.closest?.(".pad");
-  if (held && pad && pad.hasPointerCapture(event.pointerId)) followPointer(event, pad);
+  if (!held || !pad?.hasPointerCapture(event.pointerId)) return;
+  if (event.pointerType === "mouse" && !(event.buttons & 1)) releasePad(); // pointerup comes with the last button only
+  else followPointer(event, pad);
 });
 for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) {
   document.addEventListener(type, (event) => event.target.closest?.(".pad") && releasePad());
@@ -100,6 +107,8 @@ function padOf(event) {
 }
 
 document.addEventListener("keydown", (event) => {
+  repeating = event.repeat && pressed.has(event.code) ? event.code : null;
+  repeatedAt = performance.now();
   if (event.ctrlKey || event.altKey || event.metaKey) releasePad(); // with these, some systems send no keyup
   else if (event.code in KEYS) pressKey(event);
 });
@@ -113,6 +122,7 @@ function pressKey(event) {
   followKeys(pad);
 }
 document.addEventListener("keyup", (event) => {
+  repeating = null; // the system does not go on to repeat another key
   if (!pressed.delete(event.code)) return;
   event.preventDefault();
   followKeys(held?.pad);
@@ -128,5 +138,8 @@ function followKeys(pad) {
 document.addEventListener("keydown", (event) => event.code === "Space" && letGo(), true);
 document.addEventListener("focusout", (event) => event.target.closest?.(".pad") && releasePad());
 document.addEventListener("visibilitychange", () => document.hidden && letGo());
+// While a menu is open or something is dragged, the page is not told what is released.
+document.addEventListener("contextmenu", (event) => (held || pressed.size) && event.preventDefault(), true);
+document.addEventListener("dragstart", letGo, true);
 window.addEventListener("blur", letGo);
 window.addEventListener("pagehide", letGo);
