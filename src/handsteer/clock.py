@@ -19,8 +19,8 @@ _NS_PER_S = 1_000_000_000
 _LOOK_AGAIN_S = 0.005
 # Simulators publish their time 10 to 1000 times a second.
 _STANDS_AFTER_S = 0.15
-# A busy simulator is silent for less.
-_PAUSED_S = 2.0
+# So that the next sign, within the time that all faults have, stops the robot.
+_PAUSED_S = 0.4
 # Minimum change that counts as a set clock; less may be a delay.
 _LEAST_SET_S = 1.0
 # More than every timeout of what moves the robot.
@@ -164,7 +164,7 @@ class SimulatedClock:
 
     @property
     def is_paused(self) -> bool:
-        """Whether the simulator's time has not advanced for two seconds of real time."""
+        """Whether the simulator's time has not advanced for 0.4 s of real time."""
         return self.silence_s > _PAUSED_S
 
     def tell(self, time_s: float) -> None:

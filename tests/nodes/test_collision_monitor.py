@@ -199,6 +199,7 @@ def test_it_can_be_turned_on_and_off_while_it_runs() -> None:
     bench.show("Forward", 5)
     assert bench.command == (0.0, 0.0)
     bench.control.reconfigure(Config())
+    bench.show("Stop", 1)
     bench.show("Forward", 5)
     assert bench.command[0] > 0.0
 
@@ -230,6 +231,23 @@ def test_how_fast_the_robot_is_it_hears_from_odometry(says: list[Odometry], *, i
         bench.show("Turn Left", 1, ahead(0.57))
         told.append(bench.command[0])
     assert (told[0] < told[1]) == is_slower
+
+
+@pytest.mark.parametrize("change", [{"assist": "off"}, {"margin": 0.0}])
+def test_what_held_the_robot_back_sets_it_in_motion_by_no_change(change: dict[str, Any]) -> None:
+    rule = CollisionMonitorConfig()
+    bench = MonitorBench(rule, ControlConfig(assist="brake"))
+    bench.show("Forward", 60, ahead(0.4))
+    assert bench.command == (0.0, 0.0)
+    control = ControlConfig(assist=change.get("assist", "brake"))
+    margin = {name: value for name, value in change.items() if name == "margin"}
+    bench.control.reconfigure(Config(control=control, collision_monitor=rule.model_copy(update=margin)))
+    bench.show("Forward", 30, ahead(0.4))
+    assert bench.command == (0.0, 0.0)
+    assert bench.report()[0].endswith("to begin (its limits have changed)")
+    bench.show("Stop", 1, ahead(0.4))
+    bench.show("Forward", 3, ahead(0.4))
+    assert bench.command[0] > 0.0
 
 
 @pytest.mark.parametrize("linear_mps", [1000.0, -1000.0, 26.0, 1e200, -1e308, math.inf])

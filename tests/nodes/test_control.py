@@ -823,6 +823,32 @@ def test_a_hand_that_neither_holds_nor_points_is_released(
     assert is_released(message) == is_release
 
 
+@pytest.mark.parametrize("limit", ["max_linear", "max_angular"])
+@pytest.mark.parametrize("mode", ["joystick", "signs"])
+def test_a_higher_limit_makes_what_is_held_no_faster(mode: str, limit: str) -> None:
+    bench = ControlBench(ControlConfig(mode=mode, max_linear=0.5, max_angular=0.5))
+    control, steering = bench.control, bench.transport.advertise("pad", STEERING_CMD_VEL)
+
+    def hold(forward: float) -> None:
+        if mode == "joystick":
+            bench.hold(Stick(forward > 0.0, forward, forward))
+        else:
+            steering.publish(twist(9.0 * forward, 9.0 * forward))
+            bench.run(1 / 30)
+
+    hold(0.0)
+    hold(1.0)
+    assert bench.last() == (0.5, 0.5)
+    control.reconfigure(Config(control=ControlConfig(mode=mode, **{"max_linear": 0.5, "max_angular": 0.5, limit: 1.0})))
+    for _ in range(10):
+        hold(1.0)
+    assert bench.last() == (0, 0)
+    for _ in range(20):
+        hold(0.0)
+    hold(1.0)
+    assert max(bench.last()) == 1.0
+
+
 def test_signs_do_not_drive_in_the_mode_of_the_joystick_nor_the_joystick_in_that_of_signs() -> None:
     bench = ControlBench(JOYSTICK)
     bench.show(*["Forward"] * 10)
@@ -1041,7 +1067,9 @@ def test_while_the_simulators_clock_stands_still_nothing_moves() -> None:
     show("Stop", 2.0)
     show("Forward", 1.0)
     assert commands[-1] > 0.0
-    show("Forward", 3.0, pace=0.0)
+    show("Forward", 0.5, pace=0.0)
+    assert commands[-1] == 0.0, "within half a second, as after each fault"
+    show("Forward", 2.5, pace=0.0)
     assert commands[-1] == 0.0
     heard = len(commands)
     show("Stop", 1.0, pace=0.0)

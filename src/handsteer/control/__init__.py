@@ -165,11 +165,14 @@ class Control:
         """Change limits, steps and times; return the velocity to command now if the last one exceeds the new limits.
 
         Another mode or rule, or another action of the sign that is shown, stops the robot, and the hand must show
-        neutral first.
+        neutral first; so does a higher limit while what is held drives, as its share of that would be faster.
         """
         stopped: Velocity | None = None
         if self._way_to_drive(config) != self._way_to_drive(self._config):
             self.safety.disarm("its rule has changed")
+            stopped = self.halt()
+        elif self.mux.source in ("steering", "joystick") and _is_faster(config, self._config):
+            self.safety.disarm("its limits have changed")
             stopped = self.halt()
         self._config = config
         self.safety.reconfigure(config)
@@ -212,6 +215,10 @@ class Control:
             return None
         since_s, self._since_command_s = self._since_command_s, 0.0
         return self._ramp.step(velocity, min(since_s, self._config.sign_timeout))
+
+
+def _is_faster(config: ControlConfig, than: ControlConfig) -> bool:
+    return config.max_linear > than.max_linear or config.max_angular > than.max_angular
 
 
 class TwistMux:

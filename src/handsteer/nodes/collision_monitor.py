@@ -86,13 +86,15 @@ class CollisionMonitor:
         self._beside = ""
         self.reconfigure(control, rule)
 
-    def reconfigure(self, control: ControlConfig, rule: CollisionMonitorConfig) -> None:
-        """Change what is done before obstacles.
+    def reconfigure(self, control: ControlConfig, rule: CollisionMonitorConfig) -> bool:
+        """Change what is done before obstacles; return whether something held the robot back that may not any more.
 
         Raises:
             PluginError: The assist of a plug-in cannot be loaded.
         """
         limiter, kind = self._limiter, assist_of(control, rule)
+        held_back = self._kind != "off" and (bool(self.why_blind()) or self.obstacle_m is not None)
+        is_other = (kind, rule) != (self._kind, limiter.rule)
         if kind != self._kind:
             limiter.assist = assist_named(kind)
         self._kind = kind
@@ -102,6 +104,7 @@ class CollisionMonitor:
             self._listens = True
             self._node.subscribe(self._scan, self._on_scan)
             self._node.subscribe(self._odom, self._on_odometry)
+        return held_back and is_other
 
     def admit(self, wanted: Velocity) -> Velocity:
         """Return the velocity to command instead of ``wanted``."""

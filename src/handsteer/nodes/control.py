@@ -154,7 +154,9 @@ class HandSignControlNode(Node):
         """Apply all of ``control``; a robot that exceeds new limits is slowed at once."""
         self._config = config.control
         self._stall_guard.limit_s = config.control.sign_timeout
-        self._monitor.reconfigure(config.control, config.collision_monitor)
+        if self._monitor.reconfigure(config.control, config.collision_monitor):
+            self._safety.disarm("its limits have changed")
+            self._publish(self._control.halt())
         self._publish(self._control.reconfigure(config.control))
         self._listen()
 

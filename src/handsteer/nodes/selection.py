@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from handsteer.errors import quoted
 from handsteer.messages import SELECT_ROBOT, SELECTED_ROBOT, String, Topic
 from handsteer.nodes.base import Node
 from handsteer.transports.base import Received
@@ -73,7 +74,7 @@ class Selection:
         if name == NEXT:
             name = self._names[(self._names.index(self.robot) + 1) % len(self._names)]
         if name not in self._names:
-            log.warning("there is no robot %r to select; there are %s", name, ", ".join(self._names))
+            log.warning("there is no robot %s to select; there are %s", quoted(name), ", ".join(self._names))
         elif name != self.robot:
             self._left[self.robot] = _LAST_ZEROS
             self._left.pop(name, None)

@@ -13,6 +13,8 @@ _LEAK = 0.01
 _SENDERS = 32
 # Of simulators that are slower than real time.
 _LEAST_PACE = 0.2
+# A busy simulator is silent for less.
+_CLOCK_SILENCE_S = 2.0
 
 log = logging.getLogger(__name__)
 
@@ -93,7 +95,7 @@ class ClockMonitor:
 
     def check(self) -> None:
         """Look whether ``/clock`` has stopped."""
-        is_silent = isinstance(self._clock, SimulatedClock) and self._clock.is_paused
+        is_silent = isinstance(self._clock, SimulatedClock) and self._clock.silence_s > _CLOCK_SILENCE_S
         if is_silent and not self._was_silent:
             log.warning("use_sim_time is set, but /clock stands still: frames count as old, and the robot is stopped")
         self._was_silent = is_silent

@@ -19,7 +19,7 @@ _TOPICS: dict[str, dict[str, Topic[Any]]] = {
 }
 _GESTURE_TOPIC = "publish_gesture_topic"
 _OF_THE_RECOGNITION = f"hand_sign_recognition/{_GESTURE_TOPIC}"
-_TOPIC_NAME = re.compile(r"[~/]?[A-Za-z]\w*(/\w+)*", re.ASCII)
+TOPIC_NAME = re.compile(r"[~/]?[A-Za-z]\w*(/\w+)*", re.ASCII)
 _SHIPPED, _OF_THE_MODEL = "shipped", "of_the_model"
 _NETWORKS = (".tflite", ".hdf5", ".h5", ".keras")
 
@@ -60,6 +60,8 @@ def translate(kind: str, node: str, parameters: Mapping[str, Any], read: Callabl
         found.parameters.setdefault("source", camera)
     elif kind == "hand_sign_control":
         commands = found.topics.get(CMD_VEL.name, "")
+        if commands and found.parameters.get("robots"):
+            log.warning("control_topic is not used: several robots are commanded on %s below their names", CMD_VEL.name)
         if commands.endswith("cmd_vel"):  # the odometry is next to the commands: /cmd_vel, /odom
             found.topics[ODOM.name] = commands.removesuffix("cmd_vel") + "odom"
         _follow_the_recognition(found, node, read(_OF_THE_RECOGNITION))
@@ -84,7 +86,7 @@ def _follow_the_recognition(found: Translation, node: str, gesture_topic: Any) -
 
 
 def _topic_name(parameter: str, value: Any) -> str:
-    if not isinstance(value, str) or not _TOPIC_NAME.fullmatch(value):
+    if not isinstance(value, str) or not TOPIC_NAME.fullmatch(value):
         raise ConfigError(f"ROS parameter {parameter}: {value!r} should be the name of a topic, as /camera/image_raw")
     return value
 

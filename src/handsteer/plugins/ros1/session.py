@@ -2,6 +2,7 @@
 
 import logging
 import math
+import re
 import sys
 import threading
 import time
@@ -10,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
-from handsteer.errors import HandsteerError, TransportError
+from handsteer.errors import HandsteerError, TransportError, quoted
 from handsteer.transports.base import Call, Session
 
 try:
@@ -39,6 +40,7 @@ _SILENT_UNTIL_LOST_S = 1.5
 # rospy sends on its own threads and does not report when they are done.
 _DELIVER_S = 0.1
 _LEAVE_TIMEOUT_S = 2.0
+_NAMES = {"__name": re.compile(r"[A-Za-z]\w*", re.ASCII), "__ns": re.compile(r"/?|/?[A-Za-z]\w*(/\w+)*/?", re.ASCII)}
 
 
 class Ros1Session(Session):
@@ -150,6 +152,12 @@ def _refuse_what_rospy_would_ignore(arguments: Sequence[str]) -> None:
         if ":=" not in argument[1:]:
             raise TransportError(
                 f"{argument!r} is not a valid argument of ROS: it should be as name:=value, __ns:=r1, _fps:=15"
+            )
+        name, _, value = argument.partition(":=")
+        pattern = _NAMES.get(name, course.TOPIC_NAME if not name.startswith("_") else None)
+        if pattern is not None and not pattern.fullmatch(value):
+            raise TransportError(
+                f"{quoted(value)}, for {quoted(name)}, is not a valid name of ROS: use letters, digits and _"
             )
 
 

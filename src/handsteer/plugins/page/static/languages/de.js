@@ -117,6 +117,7 @@ const WORDS = {
   "laser scans did not come": "es kamen keine Laserscans",
   "the control was stalled": "die Steuerung stockte",
   "the collision monitor has failed": "der Kollisionswächter ist ausgefallen",
+  "its limits have changed": "ihre Grenzen haben sich geändert",
   "the clock stands still": "die Uhr steht still",
   "a state of the joystick was not valid": "ein Zustand des Joysticks war ungültig",
   "open, close and open your hand to begin": "öffne, schließe und öffne die Hand, um zu beginnen",
