@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 from unittest.mock import Mock
 
 import numpy as np
@@ -129,10 +131,13 @@ def test_a_time_that_cannot_be_stops_the_robot(dt_s: float) -> None:
     assert set(person.shows("Forward", 1.0)) == {ZERO}
 
 
-def test_a_broken_image_raises_and_leaves_the_robot_standing() -> None:
+@pytest.mark.parametrize(
+    "image", [GREY[:, :, 0], GREY / 255.0, GREY[:0], "photo.jpg", Path("photo.jpg"), [1, 2], object()], ids=type
+)
+def test_a_broken_image_raises_and_leaves_the_robot_standing(image: Any) -> None:
     teleop = Teleop(Config(control=ControlConfig(arming="off")))
     with pytest.raises(FrameError):
-        teleop.step(GREY[:, :, 0], DT_S)
+        teleop.step(image, DT_S)
     assert teleop.step(None, DT_S) == ZERO
 
 

@@ -250,8 +250,10 @@ class Graph:
             duration_s: How much of the graph's time to run, in seconds; a file that ends may end the run before.
 
         Raises:
-            ConfigError: The graph's clock is real, or its camera waits for a device.
+            ConfigError: The graph's clock is real, its camera waits for a device, or ``duration_s`` is not valid.
         """
+        if not duration_s >= 0:
+            raise ConfigError(f"{duration_s} is not a valid duration of a run, in seconds")
         clock = self.clock
         if not isinstance(clock, SteppedClock) or not self.camera.is_paced:
             raise ConfigError("a stepped run needs a video file, a folder of photos or the virtual hand as its camera")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from handsteer.cameras.freshness import Freshness
 from handsteer.config import JoystickConfig
 from handsteer.recognition.engage_gesture import EngageGesture
+from handsteer.recognition.hand import check_picture
 from handsteer.recognition.hand_joystick import HandJoystick
 from handsteer.recognition.pointing import Pointing
 from handsteer.recognition.recognizer import Recognition, Recognizer
@@ -82,6 +83,7 @@ class FramePipeline:
         Raises:
             FrameError: The image has another shape or type.
         """
+        check_picture(image)
         # The time of skipped pictures counts: a sign is bridged from when it was last seen.
         self._unseen_s += dt_s
         refused = self._freshness.why_refused(image, dt_s, recorded=recorded)

@@ -13,13 +13,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from handsteer.errors import HandsteerError
+from handsteer.errors import HandsteerError, quoted
 
 if TYPE_CHECKING:
     from handsteer.config import Config
 
 
 _NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
+# Raised by what looks at a path, before it is opened.
+_NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP)
 
 
 def set_up_logging() -> None:
@@ -44,6 +46,8 @@ def exit_code(call: Callable[[], int | None]) -> int:
         _discard_output()
         return 0
     except OSError as error:
+        if error.errno in _NOT_ALLOWED and error.filename is not None:
+            return fail(f"cannot read {quoted(error.filename)}: {error.strerror}")
         if error.errno not in _NO_SPACE:
             raise
         _discard_output()

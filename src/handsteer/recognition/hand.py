@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.errors import FrameError
 from handsteer.types import Handedness
 
 CONNECTIONS: tuple[tuple[int, int], ...] = (
@@ -18,6 +19,8 @@ CONNECTIONS: tuple[tuple[int, int], ...] = (
     *((0, 17), (13, 17), (17, 18), (18, 19), (19, 20)),
 )
 """The bones to draw between landmarks 0 (wrist) to 20 (tip of the little finger)."""
+_MAX_SIDE: Final = 32766
+"""Maximum side of a picture that OpenCV can sample, in pixels."""
 
 
 @dataclass(frozen=True)
@@ -125,3 +128,14 @@ class Classifier(Protocol):
     def confidence(self, sign: str, likelihood: float) -> float:
         """Return the confidence, 0 to 1, of ``sign`` with this ``likelihood``, 0 to 1."""
         ...
+
+
+def check_picture(image: object) -> None:
+    """Raise FrameError unless ``image`` is (height, width, 3) uint8, of 1 to 32766 pixels a side."""
+    wanted = "expected a (height, width, 3) uint8 BGR image"
+    if not isinstance(image, np.ndarray):
+        raise FrameError(f"{wanted}, got {type(image).__name__}")
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+        raise FrameError(f"{wanted}, got {image.shape} {image.dtype}")
+    if not all(1 <= side <= _MAX_SIDE for side in image.shape[:2]):
+        raise FrameError(f"{wanted} of 1 to {_MAX_SIDE} pixels a side, got {image.shape[1]}x{image.shape[0]}")

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.config import LandmarksConfig
-from handsteer.errors import FrameError
 from handsteer.recognition.estimates import (
     SAME_HAND_OVERLAP,
     SECOND_LOOK,
@@ -30,7 +29,7 @@ from handsteer.recognition.estimates import (
     hand_of,
     of_different_hands,
 )
-from handsteer.recognition.hand import Hand
+from handsteer.recognition.hand import Hand, check_picture
 from handsteer.recognition.landmark_models import PictureModel, find_pair
 from handsteer.recognition.regions import PalmDetector, Roi
 from handsteer.recognition.search import (
@@ -59,8 +58,6 @@ _FOLLOW: Final = Pace(change=3, settle_s=0.08, period_s=0.1)
 """How often to process tracked hands: below three levels, landmarks deviate by at most 0.03 of the hand."""
 _SAME_TURN_OVERLAP: Final = 0.3
 """Regions that overlap more than this share a turn: one way to search gives a face a region 1.5 times another's."""
-_MAX_SIDE: Final = 32766
-"""Maximum side of a picture that OpenCV can sample, in pixels."""
 
 
 class MediaPipeLandmarker:
@@ -107,7 +104,7 @@ class MediaPipeLandmarker:
         A frame of another size starts a new stream: no hand is tracked into it. A rejected frame changes nothing.
         Without ``dt_s``, every frame is processed.
         """
-        _check(image)
+        check_picture(image)
         height, width = image.shape[:2]
         if (width, height) != self._image_size:
             self.reset()
@@ -274,14 +271,3 @@ class MediaPipeLandmarker:
 
     def _is_present(self, estimate: Estimate) -> bool:
         return estimate.presence > self._config.min_presence
-
-
-def _check(image: object) -> None:
-    """Raise FrameError unless ``image`` is a valid picture."""
-    wanted = "expected a (height, width, 3) uint8 BGR image"
-    if not isinstance(image, np.ndarray):
-        raise FrameError(f"{wanted}, got {type(image).__name__}")
-    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
-        raise FrameError(f"{wanted}, got {image.shape} {image.dtype}")
-    if not all(1 <= side <= _MAX_SIDE for side in image.shape[:2]):
-        raise FrameError(f"{wanted} of 1 to {_MAX_SIDE} pixels a side, got {image.shape[1]}x{image.shape[0]}")

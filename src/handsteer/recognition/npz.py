@@ -92,6 +92,7 @@ class NpzFormat:
         Raises:
             OSError: The folder does not exist, or there is no space.
         """
+        path = path.resolve()  # a link stays one
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
         try:
             with os.fdopen(handle, "wb") as file:

@@ -40,6 +40,14 @@ def test_a_sign_is_shown_saved_used_and_given_up_again() -> None:
         assert set(load_profile(profile_path(Path("Ann"))).views) == {FORWARD}
         assert abs(visit.graph.robot.state.odometry.x) < 0.01
         card.get_by_role("button", name="Einstellung beenden", exact=True).click()
+        profile_path(Path("Bad")).write_bytes(b"not a profile")
+        visit.page.reload()
+        card.get_by_label("Zeichen werden gelesen").click()
+        visit.page.get_by_role("option", name="Bad").click()
+        problem = card.get_by_text("Bad.npz")
+        problem.wait_for()
+        visit.page.wait_for_timeout(1000)
+        assert problem.is_visible()
         card.get_by_label("Zeichen werden gelesen").click()
         visit.page.get_by_role("option", name="wie alle sie zeigen").click()
         visit.wait_until(lambda: visit.graph.config.signs.profile is None)

@@ -228,6 +228,13 @@ def test_only_the_driver_leads_by_the_input_of_the_condition_and_who_leaves_driv
         third.get_by_role("button", name="Give up").click()
         third.locator(".study", has_text="Lap 1 of 2").wait_for()
         assert [row["outcome"] for row in rows(path)] == ["repeated", "repeated", "given_up"]
+        study = third.url
+        third.goto(study.replace("/study", "/settings"))
+        third.locator(".banner").get_by_role("button", name="Reset").click()
+        third.wait_for_timeout(1000)
+        assert third.locator(".banner .headline").inner_text() == "Stopped"
+        third.goto(study)
+        third.locator(".study", has_text="Lap 1 of 2").wait_for()
         third.set_viewport_size(SMALLEST_PHONE)
         assert third.evaluate("document.documentElement.scrollWidth") <= SMALLEST_PHONE["width"]
         assert faults(third) == []

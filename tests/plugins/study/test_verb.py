@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from handsteer.plugins.study.plan import load_courses, read_plan
+from handsteer.plugins.study.results import locked, prepare
 from handsteer.plugins.study.session import Session
 from tests.cli.test_cli import fails, prints
 from tests.plugins.study.plans import PAD, SIGNS, a_task, write
@@ -41,6 +42,14 @@ def test_a_wrong_option_ends_with_a_message(
     arguments: list[str], message: str, plan: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert re.search(message, fails(capsys, "study", str(plan), *arguments))
+
+
+def test_two_studies_do_not_write_to_one_folder(plan: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    results = plan.parent / "out"
+    prepare(results)
+    with locked(results):
+        said = fails(capsys, "study", str(plan), "--participant", "P01", "--results", "out")
+    assert said.endswith("another study writes its results to out: end it first")
 
 
 def test_a_wrong_plan_ends_with_file_field_and_what_would_be_right(

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.errors import DatasetError
-from handsteer.plugins.teach.dataset import Dataset, Take, load_dataset, save_dataset, summarise
+from handsteer.plugins.teach.dataset import Dataset, Take, add_takes, load_dataset, save_dataset, summarise
 from handsteer.recognition.custom_signs import label_for
 from tests.plugins.teach.takes import take
 
@@ -23,6 +23,18 @@ def same(one: Take, other: Take) -> bool:
         and np.array_equal(one.world, other.world, equal_nan=True)
         and [hand.handedness for hand in one.hands] == [hand.handedness for hand in other.hands]
     )
+
+
+def test_takes_are_added_to_what_the_file_has_by_now_and_a_link_stays_one(tmp_path: Path) -> None:
+    """Two programs may collect at once; they began with the same file, or with none."""
+    path = tmp_path / "some.npz"
+    for each in SOME.takes:
+        added = add_takes([each], path)
+    assert [take.label for take in added.takes] == ["Hi", "NONE", "Hi"]
+    (tmp_path / "link.npz").symlink_to(path)
+    add_takes(SOME.takes[:1], tmp_path / "link.npz")
+    assert (tmp_path / "link.npz").is_symlink()
+    assert [take.label for take in load_dataset(path).takes] == ["Hi", "NONE", "Hi", "Hi"]
 
 
 def test_what_is_saved_is_loaded(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import socket
 from handsteer.cameras.webcam import Webcam, webcams
 from handsteer.clock import RealClock
 from handsteer.config import CameraConfig
-from handsteer.errors import CameraError, ModelError
+from handsteer.errors import CameraError, ConfigError, ModelError
 from handsteer.plugins.doctor.ros2 import Finding, examine_ros2
 from handsteer.recognition.landmark_models import MODELS, find_model, models_dir
 
@@ -63,7 +63,9 @@ def _port(port: int) -> Finding:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(("127.0.0.1", port))
-        except OSError as error:
+        except (OSError, OverflowError) as error:
+            if isinstance(error, OverflowError):
+                raise ConfigError(f"port {port} should be from 0 to 65535") from None
             return Finding(
                 "port",
                 "missing",

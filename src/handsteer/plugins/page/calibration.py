@@ -18,7 +18,7 @@ from handsteer.plugins.page.remote_graph import RemoteGraph
 from handsteer.plugins.teach.calibration import Calibration, calibrate
 from handsteer.plugins.teach.collect import Collector, Facts, Status, largest
 from handsteer.recognition.hand import Hand, Landmarker
-from handsteer.recognition.profile import profile_name, profile_names, profile_path, save_profile
+from handsteer.recognition.profile import completed, profile_name, profile_names, profile_path, save_profile
 from handsteer.recognition.recognizer import open_landmarker
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.transports.base import Received, Transport
@@ -241,9 +241,12 @@ class Calibrations:
             if node is None or node.state.result is None:
                 return
             profile = node.state.result.profile
-            save_profile(profile, profile_path(Path(profile.name)))
+            path = profile_path(Path(profile.name))
+            profile, kept = completed(profile, path)
+            save_profile(profile, path)
             self.choose(profile.name)
-            node.say("Saved, and in use. End the calibration, then press Reset to drive.")
+            others = f" Kept from the profile that was there: {', '.join(kept)}." if kept else ""
+            node.say(f"Saved, and in use.{others} End the calibration, then press Reset to drive.")
 
     def choose(self, name: str) -> None:
         """Let the graph use the saved profile ``name``; with an empty name, everybody's signs.

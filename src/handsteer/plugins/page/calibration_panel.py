@@ -139,11 +139,11 @@ class CalibrationPanel:
     async def _choose(self) -> None:
         if self._is_updating:
             return
-        name = str(self._choice.value or "")
+        name, chosen = str(self._choice.value or ""), self._calibrations.chosen
+        if name == (str(chosen) if chosen is not None else ""):
+            return  # set back after an error, which stays
         if self._may_change():
-            chosen = self._calibrations.chosen
-            if name != (str(chosen) if chosen is not None else ""):
-                await self._try(lambda: self._calibrations.choose(name))
+            await self._try(lambda: self._calibrations.choose(name))
         self._shown = None
 
     def _may_change(self) -> bool:

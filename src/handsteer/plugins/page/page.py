@@ -263,7 +263,8 @@ class Page:
             self._context.presses.obey(self.client.id, press, lambda: node.halt(self.client.id))
 
     def _reset(self) -> None:
-        self.do(DashboardNode.reset)
+        if self._context.study is None:  # else its page decides
+            self.do(DashboardNode.reset)
 
     def _leave(self) -> None:
         node = self._context.node

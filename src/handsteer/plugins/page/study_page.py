@@ -137,7 +137,7 @@ class StudyPage(Page):
         if session is not None and (session.lap is None or session.lap.course is None):
             self._card.message = f"{_STANDS.capitalize()}."
         else:
-            super()._reset()
+            self.do(DashboardNode.reset)
 
     def _abandon(self) -> None:
         """End the lap of a viewer whose connection is lost."""

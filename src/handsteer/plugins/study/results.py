@@ -9,7 +9,8 @@ import errno
 import io
 import logging
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +19,11 @@ from handsteer.errors import StudyError
 from handsteer.plugins.study.forms import FORMS
 from handsteer.plugins.study.order import Step
 from handsteer.plugins.study.plan import NOT_OF_A_LAP, config_hash
+
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
 
 log = logging.getLogger(__name__)
 
@@ -71,6 +77,27 @@ def prepare(folder: Path) -> None:
         raise StudyError(f"the results cannot be kept in {folder}: {error.strerror}") from None
     if not os.access(folder, os.W_OK | os.X_OK):
         raise StudyError(f"the results cannot be kept in {folder}: it cannot be written to")
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Keep other studies from writing to the existing ``folder`` meanwhile; does nothing where there is no ``flock``.
+
+    Raises:
+        StudyError: One does.
+    """
+    if fcntl is None:
+        yield  # type: ignore[unreachable]
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise StudyError(f"another study writes its results to {folder}: end it first") from None
+        yield
+    finally:
+        os.close(handle)
 
 
 class Results:

@@ -47,7 +47,7 @@ def study(
     from handsteer.cli.installation import fetch_missing
     from handsteer.plugins.study.order import order_of
     from handsteer.plugins.study.plan import course_file, load_configs, load_courses, read_plan
-    from handsteer.plugins.study.results import prepare
+    from handsteer.plugins.study.results import locked, prepare
     from handsteer.plugins.study.session import Session, Task
 
     the_plan = read_plan(plan)
@@ -71,8 +71,9 @@ def study(
     first_config = next(iter(configs.values()))
     fetch_missing(first_config)
     prepare(folder)
-    say(f"{participant}: {done} of {steps} laps and forms are done; the results are written to {folder}")
-    drive(first_config, study=task(participant))
+    with locked(folder):
+        say(f"{participant}: {done} of {steps} laps and forms are done; the results are written to {folder}")
+        drive(first_config, study=task(participant))
     return 0
 
 

@@ -115,6 +115,17 @@ def load_dataset(path: Path) -> Dataset:
     return _FILE.read(path, dataset_from)
 
 
+def add_takes(takes: Iterable[Take], path: Path) -> Dataset:
+    """Add ``takes`` to the file ``path``, which another program may have changed, or which may not exist; return it.
+
+    Raises:
+        DatasetError: It cannot be read or written.
+    """
+    known = (load_dataset(path) if path.exists() else Dataset()).with_takes(takes)
+    save_dataset(known, path)
+    return known
+
+
 def save_dataset(dataset: Dataset, path: Path) -> None:
     """Write ``dataset`` to ``path`` atomically: an older file exists until the new one does.
 

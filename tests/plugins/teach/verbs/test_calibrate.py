@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from handsteer.plugins.teach.dataset import Dataset, Take, save_dataset
+from handsteer.plugins.teach.dataset import Dataset, Take, load_dataset, save_dataset
 from handsteer.recognition.landmark_models import models_dir
 from handsteer.recognition.profile import load_profile, profiles_dir
-from handsteer.types import FORWARD, SIGNS, STOP
+from handsteer.types import FORWARD, GO, SIGNS, STOP
 from tests.cli.test_cli import fails, prints
 from tests.recognition.odd_person import odd_hands
 
@@ -27,6 +27,18 @@ def dataset_of(count: int, seed: int, path: Path) -> str:
     ]
     save_dataset(Dataset(tuple(takes)), path)
     return str(path)
+
+
+def test_a_profile_that_is_there_keeps_the_signs_that_are_not_shown_again(capsys: pytest.CaptureFixture[str]) -> None:
+    whole = dataset_of(5, 0, Path("whole.npz"))
+    prints(capsys, "signs", "calibrate", "--from", whole, "--out", "mine.npz")
+    before = load_profile(Path("mine.npz"))
+    part = Dataset(tuple(take for take in load_dataset(Path(whole)).takes if take.label == STOP))
+    save_dataset(part, Path("part.npz"))
+    prints(capsys, "signs", "calibrate", "--from", "part.npz", "--out", "mine.npz")
+    after = load_profile(Path("mine.npz"))
+    assert set(after.views) == set(before.views) == set(SIGNS)
+    assert after.reach[GO] == before.reach[GO]
 
 
 @pytest.mark.slow

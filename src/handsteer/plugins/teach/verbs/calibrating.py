@@ -25,7 +25,7 @@ from handsteer.plugins.teach.evaluation.views import View
 from handsteer.plugins.teach.terminal import Keys, TerminalPicture
 from handsteer.plugins.teach.verbs.calibrate import Timing
 from handsteer.recognition.hand import Hand
-from handsteer.recognition.profile import profile_path, save_profile
+from handsteer.recognition.profile import completed, profile_path, save_profile
 from handsteer.recognition.recognizer import draw_hand, open_landmarker
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import NONE, SIGNS
@@ -72,7 +72,8 @@ def make_profile(config: Config, plan: Plan, *, json: bool) -> None:
         fetch_missing(config)
         shown = _of_photos(config, source, shipped) if source is not None else _live(config, hands, plan.timing)
     made = calibrate(plan.name, shown, shipped)
-    save_profile(made.profile, path)
+    profile, kept = completed(made.profile, path)
+    save_profile(profile, path)
     if json:
         print(json_format.dumps({"profile": str(path), "signs": [_as_dict(each) for each in made.results]}))
     else:
@@ -81,7 +82,9 @@ def make_profile(config: Config, plan: Plan, *, json: bool) -> None:
         if each.why_not:
             say(f"{each.sign} was not adapted: {each.why_not}")
     missing = [sign for sign in SIGNS if sign not in {each.sign for each in made.results}]
-    if missing:
+    if kept:
+        say(f"kept from the profile that was there: {', '.join(kept)}")
+    if missing := [sign for sign in missing if sign not in kept]:
         say(f"not shown, so read as everybody's: {', '.join(missing)}")
     chosen = plan.name if path == profile_path(Path(plan.name)) else path
     say(f"the profile is in {path}: drive with --signs.profile {chosen}")

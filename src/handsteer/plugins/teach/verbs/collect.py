@@ -162,7 +162,7 @@ def import_keypoints(
     not_mirrored
         The rows come from unmirrored images; most such projects mirror them first.
     """
-    from handsteer.plugins.teach.dataset import Dataset, load_dataset, save_dataset
+    from handsteer.plugins.teach.dataset import Dataset, add_takes, load_dataset
     from handsteer.plugins.teach.exchange import read_keypoints
     from handsteer.plugins.teach.verbs.tables import dataset_table
     from handsteer.recognition.custom_signs import label_for
@@ -171,9 +171,7 @@ def import_keypoints(
     known = load_dataset(dataset) if dataset.exists() else Dataset()
     names = {number: label_for(name, known.labels) for number, name in _names(labels).items()}
     takes = read_keypoints(source, names, person or source.name.split(".")[0], mirrored=not not_mirrored)
-    known = known.with_takes(takes)
-    save_dataset(known, dataset)
-    print(dataset_table(known))
+    print(dataset_table(add_takes(takes, dataset)))
     return 0
 
 

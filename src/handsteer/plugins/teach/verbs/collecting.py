@@ -16,7 +16,7 @@ from handsteer.clock import RealClock
 from handsteer.config import Config
 from handsteer.errors import DatasetError
 from handsteer.plugins.teach.collect import Collector, Facts, Status, collect_live, collect_moment, collect_recorded
-from handsteer.plugins.teach.dataset import Dataset, load_dataset, save_dataset
+from handsteer.plugins.teach.dataset import Dataset, add_takes, load_dataset, save_dataset
 from handsteer.plugins.teach.terminal import Keys, TerminalPicture
 from handsteer.plugins.teach.verbs.tables import dataset_table
 from handsteer.recognition.custom_signs import label_for
@@ -77,12 +77,11 @@ def collect_takes(config: Config, plan: Plan, recording: Path | None, moments: S
     fetch_missing(config)
     if recording is not None:
         landmarker = open_landmarker(config)
-        known = known.with_takes([collect_moment(recording, landmarker, facts, *part) for part in parts])
-        save_dataset(known, plan.dataset)
+        known = add_takes([collect_moment(recording, landmarker, facts, *part) for part in parts], plan.dataset)
     elif is_file:
         without: list[Path] = []
-        known = known.with_takes(collect_recorded(file, open_landmarker(config), facts, plan.take_s, without.append))
-        save_dataset(known, plan.dataset)
+        takes = list(collect_recorded(file, open_landmarker(config), facts, plan.take_s, without.append))
+        known = add_takes(takes, plan.dataset)
         _say_without_hand(without)
     else:
         known = _live(config, plan, facts, known)
@@ -100,23 +99,26 @@ def _live(config: Config, plan: Plan, facts: Facts, known: Dataset) -> Dataset:
     landmarker = open_landmarker(config)
     camera = open_camera(config, clock)
     view = _View(facts.label)
-    began = len(known.takes)
+    added = 0
     try:
         with Keys() as keys:
 
             def show(image: NDArray[np.uint8], hand: Hand | None, status: Status) -> None:
-                nonlocal known
+                nonlocal known, added
                 if keys.pressed("q"):
                     raise KeyboardInterrupt
-                if keys.pressed("u") and len(known.takes) > began:
+                if keys.pressed("u") and added:
+                    if len(load_dataset(plan.dataset).takes) > len(known.takes):
+                        raise DatasetError(f"another program adds takes to {plan.dataset}: nothing was undone")
                     known = known.without_last()
                     save_dataset(known, plan.dataset)
+                    added -= 1
                     collector.again()
-                view.show(image, hand, status, len(known.takes) - began)
+                view.show(image, hand, status, added)
 
             for take in collect_live(camera, landmarker, collector, clock, show=show, key_age=keys.space_age_s):
-                known = known.with_takes([take])
-                save_dataset(known, plan.dataset)
+                known = add_takes([take], plan.dataset)
+                added += 1
     except KeyboardInterrupt:
         say("ended; the takes so far are in the file")
     finally:

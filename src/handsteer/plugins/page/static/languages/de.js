@@ -746,6 +746,7 @@ const WORDS = {
   "No sign was adapted: {}.": "Kein Zeichen wurde angepasst: {}.",
   "The calibration failed; the log says why.": "Die Einstellung ist gescheitert; das Protokoll sagt, warum.",
   "The calibration is over. Press Reset to drive.": "Die Einstellung ist vorbei. Drücke Zurücksetzen, um zu fahren.",
+  "Saved, and in use. Kept from the profile that was there: {}. End the calibration, then press Reset to drive.": "Gespeichert und in Gebrauch. Aus dem vorhandenen Profil behalten: {}. Beende die Einstellung, dann drücke Zurücksetzen, um zu fahren.",
   "Saved, and in use. End the calibration, then press Reset to drive.": "Gespeichert und in Gebrauch. Beende die Einstellung, dann drücke Zurücksetzen, um zu fahren.",
   "Another viewer drives: ask to drive first, then calibrate.": "Jemand anderes fährt: frage zuerst das Steuer an, dann stelle ein.",
   "Another viewer drives now: the calibration has ended.": "Jetzt fährt jemand anderes: die Einstellung ist beendet.",
