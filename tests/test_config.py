@@ -63,6 +63,7 @@ def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
         ("- 1", r"expected sections such as 'control:' at the top, found list"),
         ("control: {", r"line 1: not valid YAML"),
         ("control: 3", r"line 1: control: 3 should be parameters, each with its value$"),
+        ("control: {robots: r1}", r"control\.robots: 'r1' should be a list, such as \[a, b\]$"),
         ('signs: {model: "a\\0b"}', r"signs.model: 'a\\x00b' must have no null character"),
     ],
 )

@@ -47,7 +47,7 @@ def exit_code(call: Callable[[], int | None]) -> int:
         return 0
     except OSError as error:
         if error.errno in _NOT_ALLOWED and error.filename is not None:
-            return fail(f"cannot read {quoted(error.filename)}: {error.strerror}")
+            return fail(f"cannot use {quoted(error.filename)}: {error.strerror}")
         if error.errno not in _NO_SPACE:
             raise
         _discard_output()

@@ -275,6 +275,8 @@ def describe(error: ValidationError, section: type[Section] | None = None) -> st
         return f"{field}: there is no such parameter{did_you_mean(str(problem['loc'][-1])[:_LONGEST_SHOWN], known)}"
     if problem["type"] == "model_type":
         return f"{field}: {quoted(problem['input'], _LONGEST_SHOWN)} should be parameters, each with its value"
+    if problem["type"] == "tuple_type":
+        return f"{field}: {quoted(problem['input'], _LONGEST_SHOWN)} should be a list, such as [a, b]"
     reason = problem["msg"].removeprefix("Input ").removeprefix("Value error, ")
     if problem["type"] == "literal_error":
         reason += did_you_mean(str(problem["input"])[:_LONGEST_SHOWN], re.findall(r"'([^']*)'", reason))

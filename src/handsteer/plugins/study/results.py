@@ -95,6 +95,8 @@ def locked(folder: Path) -> Iterator[None]:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise StudyError(f"another study writes its results to {folder}: end it first") from None
+        except OSError as error:
+            log.warning("%s cannot be locked (%s): end other studies that write there", folder, error.strerror)
         yield
     finally:
         os.close(handle)
