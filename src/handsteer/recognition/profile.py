@@ -4,7 +4,7 @@ import json
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -237,23 +237,6 @@ def save_profile(profile: Profile, path: Path) -> None:
         _FILE.write(path, content)
     except OSError as error:
         raise ProfileError(f"cannot write the profile {path}: {error.strerror}") from None
-
-
-def completed(profile: Profile, path: Path) -> tuple[Profile, tuple[str, ...]]:
-    """Return ``profile`` with the signs that it lacks of the one in the file ``path``, if any, and these signs.
-
-    Who shows only some signs again loses none of the others.
-    """
-    try:
-        older = load_profile(path) if path.exists() else None
-    except ProfileError:
-        return profile, ()
-    kept = tuple(sign for sign in older.views if sign not in profile.views) if older is not None else ()
-    if older is None or not kept:
-        return profile, ()
-    views = {**profile.views, **{sign: older.views[sign] for sign in kept}}
-    reach = {**profile.reach, **{sign: older.reach[sign] for sign in kept}}
-    return replace(profile, views=views, reach=reach), kept
 
 
 def load_profile(path: Path) -> Profile:

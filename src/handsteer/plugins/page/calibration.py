@@ -15,10 +15,10 @@ from handsteer.images import bgr_image, mirrored
 from handsteer.messages import IMAGE_RAW, Image
 from handsteer.nodes.base import Node
 from handsteer.plugins.page.remote_graph import RemoteGraph
-from handsteer.plugins.teach.calibration import Calibration, calibrate
+from handsteer.plugins.teach.calibration import Calibration, calibrate, save_calibrated
 from handsteer.plugins.teach.collect import Collector, Facts, Status, largest
 from handsteer.recognition.hand import Hand, Landmarker
-from handsteer.recognition.profile import completed, profile_name, profile_names, profile_path, save_profile
+from handsteer.recognition.profile import profile_name, profile_names, profile_path
 from handsteer.recognition.recognizer import open_landmarker
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.transports.base import Received, Transport
@@ -241,9 +241,7 @@ class Calibrations:
             if node is None or node.state.result is None:
                 return
             profile = node.state.result.profile
-            path = profile_path(Path(profile.name))
-            profile, kept = completed(profile, path)
-            save_profile(profile, path)
+            kept = save_calibrated(profile, profile_path(Path(profile.name)))
             self.choose(profile.name)
             others = f" Kept from the profile that was there: {', '.join(kept)}." if kept else ""
             node.say(f"Saved, and in use.{others} End the calibration, then press Reset to drive.")

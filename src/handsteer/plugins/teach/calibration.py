@@ -2,8 +2,9 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -24,8 +25,10 @@ from handsteer.recognition.profile import (
     Profile,
     ProfiledClassifier,
     distances,
+    load_profile,
     log_odds,
     profile_name,
+    save_profile,
     shape_probability,
     whitened,
 )
@@ -300,3 +303,20 @@ def _is_finite(hand: Hand) -> bool:
 
 def _facts(result: SignResult) -> dict[str, Any]:
     return {name: value for name, value in asdict(result).items() if name != "sign"}
+
+
+def save_calibrated(profile: Profile, path: Path) -> tuple[str, ...]:
+    """Write ``profile`` to ``path``; return the signs that it lacks and were kept of a profile there.
+
+    Who shows only some signs again loses none of the others. A damaged profile is replaced.
+
+    Raises:
+        ProfileError: It cannot be written.
+    """
+    try:
+        older = load_profile(path)
+    except ProfileError:
+        older = profile
+    views, reach = {**older.views, **profile.views}, {**older.reach, **profile.reach}
+    save_profile(replace(profile, views=views, reach=reach), path)
+    return tuple(sign for sign in older.views if sign not in profile.views)

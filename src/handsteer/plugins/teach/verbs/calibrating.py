@@ -16,7 +16,7 @@ from handsteer.cli.running import say, table
 from handsteer.clock import RealClock
 from handsteer.config import Config
 from handsteer.errors import ProfileError
-from handsteer.plugins.teach.calibration import HOLD, Calibration, SignResult, calibrate, shown_hand
+from handsteer.plugins.teach.calibration import HOLD, Calibration, SignResult, calibrate, save_calibrated, shown_hand
 from handsteer.plugins.teach.collect import Collector, Facts, Status, collect_live
 from handsteer.plugins.teach.dataset import load_dataset
 from handsteer.plugins.teach.evaluation.intervals import Share
@@ -25,7 +25,7 @@ from handsteer.plugins.teach.evaluation.views import View
 from handsteer.plugins.teach.terminal import Keys, TerminalPicture
 from handsteer.plugins.teach.verbs.calibrate import Timing
 from handsteer.recognition.hand import Hand
-from handsteer.recognition.profile import completed, profile_path, save_profile
+from handsteer.recognition.profile import profile_path
 from handsteer.recognition.recognizer import draw_hand, open_landmarker
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import NONE, SIGNS
@@ -72,8 +72,7 @@ def make_profile(config: Config, plan: Plan, *, json: bool) -> None:
         fetch_missing(config)
         shown = _of_photos(config, source, shipped) if source is not None else _live(config, hands, plan.timing)
     made = calibrate(plan.name, shown, shipped)
-    profile, kept = completed(made.profile, path)
-    save_profile(profile, path)
+    kept = save_calibrated(made.profile, path)
     if json:
         print(json_format.dumps({"profile": str(path), "signs": [_as_dict(each) for each in made.results]}))
     else:
