@@ -233,6 +233,15 @@ def test_how_fast_the_robot_is_it_hears_from_odometry(says: list[Odometry], *, i
     assert (told[0] < told[1]) == is_slower
 
 
+def assert_neutral_is_required(bench: MonitorBench, why: str, scan: RangeScan) -> None:
+    bench.show("Forward", 30, scan)
+    assert bench.command == (0.0, 0.0)
+    assert bench.report()[0].endswith(f"to begin ({why})")
+    bench.show("Stop", 1, scan)
+    bench.show("Forward", 3, scan)
+    assert bench.command[0] > 0.0
+
+
 @pytest.mark.parametrize("change", [{"assist": "off"}, {"margin": 0.0}])
 def test_what_held_the_robot_back_sets_it_in_motion_by_no_change(change: dict[str, Any]) -> None:
     rule = CollisionMonitorConfig()
@@ -242,12 +251,7 @@ def test_what_held_the_robot_back_sets_it_in_motion_by_no_change(change: dict[st
     control = ControlConfig(assist=change.get("assist", "brake"))
     margin = {name: value for name, value in change.items() if name == "margin"}
     bench.control.reconfigure(Config(control=control, collision_monitor=rule.model_copy(update=margin)))
-    bench.show("Forward", 30, ahead(0.4))
-    assert bench.command == (0.0, 0.0)
-    assert bench.report()[0].endswith("to begin (its limits have changed)")
-    bench.show("Stop", 1, ahead(0.4))
-    bench.show("Forward", 3, ahead(0.4))
-    assert bench.command[0] > 0.0
+    assert_neutral_is_required(bench, "its limits have changed", ahead(0.4))
 
 
 @pytest.mark.parametrize("linear_mps", [1000.0, -1000.0, 26.0, 1e200, -1e308, math.inf])
@@ -280,12 +284,7 @@ def test_a_collision_monitor_that_fails_stops_the_robot(monkeypatch: pytest.Monk
         patch.setattr(ObstacleLimiter, "limit", fail)
         bench.show("Forward", 10, ahead(7.0))
         assert bench.command == (0.0, 0.0)
-    bench.show("Forward", 10, ahead(7.0))
-    assert bench.command == (0.0, 0.0)
-    assert bench.report()[0].endswith("to begin (the collision monitor has failed)")
-    bench.show("Stop", 1, ahead(7.0))
-    bench.show("Forward", 1, ahead(7.0))
-    assert bench.command[0] > 0.0
+    assert_neutral_is_required(bench, "the collision monitor has failed", ahead(7.0))
 
 
 def test_several_robots_are_refused() -> None:

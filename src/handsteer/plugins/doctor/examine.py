@@ -63,9 +63,9 @@ def _port(port: int) -> Finding:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(("127.0.0.1", port))
-        except (OSError, OverflowError) as error:
-            if isinstance(error, OverflowError):
-                raise ConfigError(f"port {port} should be from 0 to 65535") from None
+        except OverflowError:
+            raise ConfigError(f"port {port} should be from 0 to 65535") from None
+        except OSError as error:
             return Finding(
                 "port",
                 "missing",
