@@ -81,10 +81,12 @@ def prepare(folder: Path) -> None:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep other studies from writing to the existing ``folder`` meanwhile; does nothing where there is no ``flock``.
+    """Hold an exclusive lock on the existing ``folder``, so that one study at a time writes to it.
+
+    Systems without ``flock`` have no lock; a file system without locks is logged.
 
     Raises:
-        StudyError: One does.
+        StudyError: Another study holds it.
     """
     if fcntl is None:
         yield  # type: ignore[unreachable]

@@ -138,7 +138,7 @@ function followKeys(pad) {
 document.addEventListener("keydown", (event) => event.code === "Space" && letGo(), true);
 document.addEventListener("focusout", (event) => event.target.closest?.(".pad") && releasePad());
 document.addEventListener("visibilitychange", () => document.hidden && letGo());
-// While a menu is open or something is dragged, the page is not told what is released.
+// While a context menu is open or an element is dragged, browsers send no keyup and no pointerup.
 document.addEventListener("contextmenu", (event) => (held || pressed.size) && event.preventDefault(), true);
 document.addEventListener("dragstart", letGo, true);
 window.addEventListener("blur", letGo);
