@@ -282,6 +282,81 @@ def drives(control: Control) -> Velocity:
     return velocity
 
 
+SLOW = ControlConfig(
+    max_linear=0.2,
+    max_angular=0.4,
+    max_linear_acceleration=0.1,
+    max_angular_acceleration=0.4,
+    max_linear_jerk=0.5,
+    max_angular_jerk=0.5,
+)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"max_linear": 1.0},
+        {"max_angular": 1.0},
+        {"linear_step": 0.5},
+        {"angular_step": 0.5},
+        {"linear_acceleration": 5.0},
+        {"angular_acceleration": 5.0},
+        {"max_sign_rate": 90.0},
+        {"ramp": "per_second"},
+        {"max_linear_acceleration": 0.0},
+        {"max_angular_acceleration": 0.5},
+        {"max_linear_jerk": 0.0},
+        {"max_angular_jerk": 0.6},
+    ],
+    ids=str,
+)
+def test_what_a_sign_drives_is_made_faster_by_no_change(change: dict[str, Any]) -> None:
+    control = Control(SLOW, arming=False)
+    for sign in [FORWARD] * 10 + ["Turn Left"] * 10:
+        control.step(DT, sign=sign)
+    assert control.reconfigure(SLOW.model_copy(update=change)) == ZERO
+    assert [control.step(DT, sign=FORWARD) for _ in range(60)] == [ZERO] * 60
+    assert control.safety.signs_wait == "its limits have changed"
+    assert drives(control).linear_mps > 0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"max_linear": 0.1}, {"max_linear_acceleration": 0.05}, {"linear_step": 0.005}, {"point_turn": 9.0}, {}],
+    ids=str,
+)
+def test_what_makes_nothing_faster_leaves_a_sign_driving(change: dict[str, Any]) -> None:
+    control = Control(SLOW, arming=False)
+    for _ in range(20):
+        control.step(DT, sign=FORWARD)
+    control.reconfigure(SLOW.model_copy(update=change))
+    velocity = control.step(DT, sign=FORWARD)
+    assert velocity is not None
+    assert velocity.linear_mps > 0
+
+
+@pytest.mark.parametrize("change", [{"max_linear_acceleration": 0.0}, {"max_angular_jerk": 0.0}], ids=str)
+def test_what_is_held_is_made_faster_by_no_limit_of_the_ramp(change: dict[str, Any]) -> None:
+    control = Control(SLOW, arming=False)
+    control.step(DT, steering=ZERO)
+    for _ in range(10):
+        control.step(DT, steering=Velocity(0.2, 0.4))
+    assert control.reconfigure(SLOW.model_copy(update=change)) == ZERO
+    assert control.step(DT, steering=Velocity(0.2, 0.4)) == ZERO
+
+
+@pytest.mark.parametrize("sign", [GO, "Turn Left"])
+def test_a_speed_that_is_kept_is_the_one_that_was_reached(sign: str) -> None:
+    """With a limit of the acceleration, the steps of signs do not wind up: a guard of ``Control._ramped``."""
+    control = Control(ControlConfig(max_linear_acceleration=0.05), arming=False)
+    reached = [control.step(DT, sign=FORWARD) for _ in range(90)][-1]
+    kept = [control.step(DT, sign=sign) for _ in range(90)][-1]
+    assert reached is not None
+    assert kept is not None
+    assert reached.linear_mps == pytest.approx(0.05 * 90 * DT, rel=0.1)
+    assert kept.linear_mps == pytest.approx(reached.linear_mps)
+
+
 @pytest.mark.parametrize("dt_s", [-0.1, math.nan, math.inf])
 def test_a_time_that_cannot_be_stops_it_until_neutral_was_seen(dt_s: float) -> None:
     control = Control(ControlConfig(), arming=True)

@@ -103,8 +103,11 @@ class Control:
     @property
     def renew_left_s(self) -> float:
         """Seconds until what drives must be shown again, unless it changes; infinite if nothing moves."""
-        is_driven = self.mux.source != "none" and not self.mux.velocity.is_zero
-        return self.safety.renewal.left_s(self._driven_by) if is_driven else math.inf
+        return self.safety.renewal.left_s(self._driven_by) if self._is_driven else math.inf
+
+    @property
+    def _is_driven(self) -> bool:
+        return self.mux.source != "none" and not self.mux.velocity.is_zero
 
     @property
     def reason(self) -> Reason:
@@ -165,13 +168,13 @@ class Control:
         """Change limits, steps and times; return the velocity to command now if the last one exceeds the new limits.
 
         Another mode or rule, or another action of the sign that is shown, stops the robot, and the hand must show
-        neutral first; so does a higher limit while what is held drives, as its share of that would be faster.
+        neutral first; so does what would make faster what drives, such as a higher limit.
         """
         stopped: Velocity | None = None
         if self._way_to_drive(config) != self._way_to_drive(self._config):
             self.safety.disarm("its rule has changed")
             stopped = self.halt()
-        elif self.mux.source in ("steering", "joystick") and _is_faster(config, self._config):
+        elif self._is_driven and _is_faster(config, self._config, by_signs=self.mux.source == "signs"):
             self.safety.disarm("its limits have changed")
             stopped = self.halt()
         self._config = config
@@ -214,11 +217,32 @@ class Control:
         if velocity is None:
             return None
         since_s, self._since_command_s = self._since_command_s, 0.0
-        return self._ramp.step(velocity, min(since_s, self._config.sign_timeout))
+        ramped = self._ramp.step(velocity, min(since_s, self._config.sign_timeout))
+        if ramped != velocity and (self.mux.source == "signs" or self._config.points):
+            self.mux.hold_back(ramped)  # what is kept, by Go or in a turn, is the speed that was reached
+        return ramped
 
 
-def _is_faster(config: ControlConfig, than: ControlConfig) -> bool:
-    return config.max_linear > than.max_linear or config.max_angular > than.max_angular
+_LIMITS = ("max_linear", "max_angular")
+_RAMPS = ("max_linear_acceleration", "max_angular_acceleration", "max_linear_jerk", "max_angular_jerk")
+_BY_SIGNS = ("linear_step", "angular_step", "linear_acceleration", "angular_acceleration", "max_sign_rate")
+
+
+def _is_faster(config: ControlConfig, than: ControlConfig, *, by_signs: bool) -> bool:
+    """Return whether what drives would be faster, or become so sooner, with ``config``."""
+
+    def grows(name: str) -> bool:
+        return bool(getattr(config, name) > getattr(than, name))
+
+    def loosens(name: str) -> bool:  # zero is no limit
+        return bool((getattr(config, name) or math.inf) > (getattr(than, name) or math.inf))
+
+    return (
+        any(map(grows, _LIMITS))
+        or any(map(loosens, _RAMPS))
+        or (by_signs and (config.ramp != than.ramp or any(map(grows, _BY_SIGNS))))
+        or (config.points and (grows("point_turn") or config.point_time < than.point_time))
+    )
 
 
 class TwistMux:
