@@ -77,3 +77,19 @@ def test_reads_files_no_further_than_they_may_go(tmp_path: Path) -> None:
         plain_yaml.read(path, str(path), ConfigError, "cannot")
     with pytest.raises(ConfigError, match="not a regular file"):
         plain_yaml.read(Path("/dev/zero"), "/dev/zero", ConfigError, "cannot")
+
+
+def test_a_key_is_read_as_it_is_written() -> None:
+    text = "Yes: yes\n12: 12\nnull: null\n'off': {on: off, 1.0: [1.0]}\n"
+    assert plain_yaml.parse(text, "w.yaml", ConfigError) == {
+        "Yes": True,
+        "12": 12,
+        "null": None,
+        "off": {"on": False, "1.0": [1.0]},
+    }
+
+
+def test_a_file_in_another_encoding_is_named_as_such(tmp_path: Path) -> None:
+    (tmp_path / "latin.yaml").write_bytes("# für mich\na: 1".encode("latin-1"))
+    with pytest.raises(ConfigError, match="not valid YAML: its text is not in UTF-8"):
+        plain_yaml.read(tmp_path / "latin.yaml", "latin.yaml", ConfigError, "cannot be read")

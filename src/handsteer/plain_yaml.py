@@ -25,6 +25,7 @@ DEEPEST: Final = 32
 LONGEST_NUMBER: Final = 64
 """Characters; Python takes minutes for numbers of millions."""
 
+_NOT_UTF8 = "not valid YAML: its text is not in UTF-8"
 _TAG = "tag:yaml.org,2002:"
 _COLLECTIONS = frozenset({f"{_TAG}seq", f"{_TAG}map"})
 _NUMBERS = frozenset({f"{_TAG}int", f"{_TAG}float"})
@@ -64,7 +65,7 @@ def parse(text: str | bytes, source: str, error: type[HandsteerError]) -> Any:
         if len(text) > LARGEST_BYTES:
             raise _ProblemError(f"is larger than {LARGEST_BYTES // 1000} kB, which no such file should be")
         _look_through(text)
-        return yaml.load(text, _Loader)
+        return yaml.load(text, _TextKeys)
     except _ProblemError as problem:
         reason, line = str(problem), problem.line
     except yaml.YAMLError as problem:
@@ -72,8 +73,8 @@ def parse(text: str | bytes, source: str, error: type[HandsteerError]) -> Any:
         reason = "not valid YAML"
         if _begins_with_tab(text, line):
             reason += ": indent with spaces, not with a tab"
-    except ValueError:  # not valid UTF-8
-        reason, line = "not valid YAML", None
+    except ValueError as problem:
+        reason, line = _NOT_UTF8 if isinstance(problem, UnicodeError) else "not valid YAML", None
     raise error(f"{source}{_at(line, text)}: {reason}") from None
 
 
@@ -97,7 +98,7 @@ def read(path: Path, source: str, error: type[HandsteerError], unreadable: str) 
     try:
         text: str | bytes = content.decode("utf-8-sig") if len(content) <= LARGEST_BYTES else content
     except UnicodeDecodeError:
-        raise error(f"{source}: not valid YAML") from None
+        raise error(f"{source}: {_NOT_UTF8}") from None
     return parse(text, source, error)
 
 
@@ -154,6 +155,17 @@ def _look_through(text: str | bytes) -> None:
         if event.tag not in (None, "!", *_COLLECTIONS):
             raise _unknown_tag(event)
         around.append(_Table() if isinstance(event, yaml.MappingStartEvent) else None)
+
+
+class _TextKeys(_Loader):
+    """Reads the keys of tables as they are written, as all of ours are names: ``Yes`` is not true, and 12 no number."""
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                key.tag = f"{_TAG}str"
+        found: dict[Any, Any] = super().construct_mapping(node, deep)
+        return found
 
 
 class _Table:
