@@ -33,6 +33,8 @@ def __getattr__(name: str) -> Any:
     """Load public names on first use, so that the command line and each node load only what they need."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    # First: it loads the parameters of plug-ins, whose modules may import any other, which must not be half loaded.
+    importlib.import_module("handsteer.config")
     return getattr(importlib.import_module(_HOMES[name]), name)
 
 

@@ -149,7 +149,8 @@ def _run(words: list[str]) -> int:
         given.arguments["parameters"] = parameters
     elif parameters:
         return fail(f"{words[0]} takes no parameters of the configuration; see handsteer {words[0]} --help")
-    for module in _LOADS.get(verb, ()):
+    # First: it loads the parameters of plug-ins, whose modules may import any other, which must not be half loaded.
+    for module in ("handsteer.config", *_LOADS.get(verb, ())):
         importlib.import_module(module)
     gc.enable()
     # The verb is loaded; from here on, an interrupt must clean up what it started.

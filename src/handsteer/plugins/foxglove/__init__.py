@@ -6,3 +6,6 @@ has the seat, if clients may drive. ``process`` runs it in a separate process, l
 
 Imports the kernel only.
 """
+
+# First, also in the process of its own: it loads the parameters of plug-ins, whose modules may import any other.
+import handsteer.config  # noqa: F401

@@ -19,3 +19,6 @@ carries its topics, and the same pipe requests to it. So nothing on the page can
 Imports the kernel, and :mod:`~handsteer.plugins.study`, :mod:`~handsteer.plugins.teach` and
 :mod:`~handsteer.plugins.virtual_hand`, whose pages and pictures it has.
 """
+
+# First, also in the process of its own: it loads the parameters of plug-ins, whose modules may import any other.
+import handsteer.config  # noqa: F401
