@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import Process, free_port
+from tests.processes import Process, eventually, free_port
 from tests.ros1.graph import Ros1Graph
 from tests.ros1.launches import ROS, ros_environment
 
@@ -39,6 +39,24 @@ def ends(command: Sequence[str], env: dict[str, str], home: Path, *, code: int =
             # dataclasses use it, though all was left in order.
             assert ended in (code, -wish, -signal.SIGINT), (moment_s, wish, process.text)
             assert "Traceback" not in process.text, (moment_s, wish)
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize("transport", ["dds", "zenoh"])
+def test_a_signal_that_comes_again_and_again(tmp_path: Path, transport: str) -> None:
+    """As from a terminal and a launcher that both end a node, and at any moment of its end."""
+    command = [*HANDSTEER, "control", "--transport", transport]
+    for number in range(4):
+        process = Process(command, dict(os.environ), tmp_path / f"{number}.log")
+        try:
+            eventually(lambda: "is ready" in process.text, what="the node to run")  # noqa: B023
+            while process.running:
+                process.signal(signal.SIGINT)
+                threading.Event().wait(0.01 + 0.005 * number)
+            assert process.code() == 0, process.text
+            assert "Traceback" not in process.text
+            assert "Exception ignored" not in process.text
         finally:
             process.kill()
 

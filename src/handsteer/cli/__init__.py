@@ -3,6 +3,7 @@
 The entry point handles signals first, then loads the rest.
 """
 
+import atexit
 import gc
 import os
 import sys
@@ -23,18 +24,30 @@ def main(arguments: list[str] | None = None) -> None:
     words = sys.argv[1:] if arguments is None else arguments
     interrupted = 0 if words and words[0] in _UNTIL_INTERRUPTED else 130
     signals.exit_on_signals(interrupted)
+    is_process = arguments is None
+    if is_process:
+        atexit.register(signals.ignore)  # what is registered first is called last
     try:
         code = _run(words)
+        _has_ended(code, is_process=is_process)
     except KeyboardInterrupt:
         code = interrupted
+        _has_ended(code, is_process=is_process)
     except Exception:
         # A library that is being imported may convert the interrupt to an error of its own.
         if not signals.were_raised():
             raise
         code = interrupted
-    finally:
-        signals.interrupt_on_signals()
+        _has_ended(code, is_process=is_process)
     sys.exit(code)
+
+
+def _has_ended(code: int, *, is_process: bool) -> None:
+    """Let no further signal change the exit code: there is nothing left to stop."""
+    if is_process:
+        signals.exit_on_signals(code)
+    else:
+        signals.interrupt_on_signals()
 
 
 def _run(words: list[str]) -> int:
@@ -45,6 +58,8 @@ def _run(words: list[str]) -> int:
     try:
         # The full command line takes 0.1 s more to load.
         if _has_only_ros1_arguments(words):
+            # First: it loads the parameters of plug-ins, whose modules may import any other of ours.
+            import handsteer.config  # noqa: F401
             from handsteer.cli.one_node import run_ros1
 
             return run_ros1(words[0], words[3:])

@@ -42,6 +42,11 @@ def exit_on_signals(code: int) -> None:
     _handle(end)
 
 
+def ignore() -> None:
+    """Ignore signals from now on, which Python's last steps would otherwise be killed by."""
+    _handle(signal.SIG_IGN)
+
+
 def interrupt_on_signals() -> None:
     """Raise KeyboardInterrupt on each signal that would end or suspend the program, so that the robot is stopped.
 
@@ -61,7 +66,7 @@ def interrupt_on_signals() -> None:
     _handle(interrupt)
 
 
-def _handle(handler: Handler) -> None:
+def _handle(handler: Handler | signal.Handlers) -> None:
     numbers = []
     for name in _ENDING:
         number = getattr(signal, name, None)
