@@ -2,9 +2,12 @@ import contextlib
 import json
 import os
 import pty
+import shutil
+import signal
 import subprocess
 import sys
 import termios
+import time
 from pathlib import Path
 
 import pytest
@@ -34,6 +37,22 @@ def test_a_table_json_and_plots(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     assert [len(cell["laps"]) for cell in json.loads(file.read_text())] == [2]
     assert {path.name for path in plots.iterdir()} == {"stop-line-times.png", "stop-line-laps.png"}
     assert str(plots / "stop-line-laps.png") in err
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("pgrep") is None, reason="pgrep is not installed")
+@pytest.mark.parametrize("moment_s", [0.0, 0.1, 0.3, 1.5])
+def test_ctrl_c_while_the_processes_start_is_said_by_no_traceback(moment_s: float) -> None:
+    command = [sys.executable, "-m", "handsteer", "bench", "--course", "stop-line", "--seeds", "50", "--jobs", "2"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        started = ["pgrep", "-g", str(process.pid), "-f", "spawn_main"]
+        while process.poll() is None and subprocess.run(started, capture_output=True, check=False).returncode:
+            time.sleep(0.01)
+        time.sleep(moment_s)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+        _, said = process.communicate()
+    assert "Traceback" not in said
+    assert process.returncode == 130
 
 
 def test_a_sweep_has_a_row_for_each_value(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -1,10 +1,14 @@
 """Many laps: cells of a table, each a course driven through an interface under conditions, and their statistics."""
 
 import multiprocessing
+import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
+from types import FrameType
 from typing import Any, Final
 
 import numpy as np
@@ -160,24 +164,69 @@ def run_cells(
             raise BenchError(f"there is no interface {cell.interface!r}; use {', '.join(INTERFACES)}")
     work = [(cell, seed, config) for cell in cells for seed in seeds]
     laps: list[Lap] = []
-    with _mapping(jobs) as mapped:
-        for lap in mapped(_lap, work):
+    with _driver(jobs) as driven:
+        for lap in driven(work):
             laps.append(lap)
             progress(1)
     count = len(seeds)
     return [CellResult(cell, tuple(laps[at * count : (at + 1) * count])) for at, cell in enumerate(cells)]
 
 
-def _lap(work: tuple[Cell, int, Config | None]) -> Lap:
+_Work = tuple[Cell, int, Config | None]
+_CAN_BLOCK: Final = hasattr(signal, "pthread_sigmask")  # not on Windows
+_INTERRUPTED: Final = threading.Event()
+"""Of a process of the pool."""
+
+
+def _lap(work: _Work) -> Lap:
     cell, seed, config = work
     return run_lap(cell.course, cell.interface, seed, cell.conditions, config=config)
 
 
 @contextmanager
-def _mapping(jobs: int) -> Iterator[Callable[..., Iterator[Lap]]]:
+def _driver(jobs: int) -> Iterator[Callable[[Iterable[_Work]], Iterator[Lap]]]:
     if jobs == 1:
-        yield map
+        yield partial(map, _lap)
         return
     # Not forked: the landmark models' threads would be missing in the children.
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
-        yield pool.map
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), initializer=_take_interrupts) as pool:
+        try:
+            yield partial(_start, pool)
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _start(pool: ProcessPoolExecutor, work: Iterable[_Work]) -> Iterator[Lap]:
+    """Start all of ``work``; the processes inherit that Ctrl-C, which a terminal sends to them too, has to wait."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT]) if _CAN_BLOCK else set()
+    try:
+        return pool.map(_lap_of_process, work)
+    finally:
+        if _CAN_BLOCK:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _take_interrupts() -> None:
+    signal.signal(signal.SIGINT, _note_interrupt)
+    if _CAN_BLOCK:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+
+
+def _note_interrupt(_signal: int, _frame: FrameType | None) -> None:
+    _INTERRUPTED.set()
+
+
+def _end_lap(_signal: int, _frame: FrameType | None) -> None:
+    _INTERRUPTED.set()
+    raise KeyboardInterrupt
+
+
+def _lap_of_process(work: _Work) -> Lap:
+    """Drive a lap in a process of the pool, unless it has been interrupted, which ends the lap it drives too."""
+    signal.signal(signal.SIGINT, _end_lap)
+    try:
+        if _INTERRUPTED.is_set():
+            raise KeyboardInterrupt
+        return _lap(work)
+    finally:
+        signal.signal(signal.SIGINT, _note_interrupt)
