@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from handsteer.cli import main
 from handsteer.plugins.teach.dataset import Dataset, Take, load_dataset, save_dataset
 from handsteer.recognition.landmark_models import models_dir
 from handsteer.recognition.profile import load_profile, profiles_dir
@@ -45,7 +46,10 @@ def test_a_profile_that_is_there_keeps_the_signs_that_are_not_shown_again(capsys
 def test_a_profile_is_made_from_a_dataset_and_used_by_name(capsys: pytest.CaptureFixture[str]) -> None:
     shown = dataset_of(5, 0, Path("shown.npz"))
     judged = dataset_of(20, 1, Path("judged.npz"))
-    text = prints(capsys, "signs", "calibrate", "--name", "odd one", "--from", shown)
+    with pytest.raises(SystemExit):
+        main(["signs", "calibrate", "--name", "odd one", "--from", shown])
+    text, said = capsys.readouterr()
+    assert "drive with --signs.profile 'odd one'\n" in said
     assert "with the profile" in text.splitlines()[0]
     assert text.splitlines()[1].split()[:2] == [STOP, "5"]
     assert load_profile(profiles_dir() / "odd one.npz").name == "odd one"

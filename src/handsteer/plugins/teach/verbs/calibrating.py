@@ -2,6 +2,7 @@
 
 import json as json_format
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -86,7 +87,7 @@ def make_profile(config: Config, plan: Plan, *, json: bool) -> None:
     if missing := [sign for sign in missing if sign not in kept]:
         say(f"not shown, so read as everybody's: {', '.join(missing)}")
     chosen = plan.name if path == profile_path(Path(plan.name)) else path
-    say(f"the profile is in {path}: drive with --signs.profile {chosen}")
+    say(f"the profile is in {path}: drive with --signs.profile {shlex.quote(str(chosen))}")
 
 
 def result_table(made: Calibration) -> str:

@@ -1,6 +1,7 @@
 """``handsteer signs list``, ``train`` and ``export``: the known signs, and learning further ones from datasets."""
 
 import json as json_format
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -115,7 +116,7 @@ def train(
     for sign in report.signs:
         if sign.recall is not None and (sign.recall.rate or 0) < _LOW_RECALL:
             say(f"{sign.summary.label} is recognised poorly: collect more takes, in every way you will show it")
-    say(f"the learnt signs are in {output}: drive with --signs.model {output}")
+    say(f"the learnt signs are in {output}: drive with --signs.model {shlex.quote(str(output))}")
     return 0
 
 
