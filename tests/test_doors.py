@@ -48,6 +48,12 @@ class Installed:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self.said: list[str] = []
+
+    def file(self, name: str, text: str) -> str:
+        """Write a file next to the modules; return its path."""
+        (self._folder / name).write_text(text)
+        return str(self._folder / name)
 
     def add(self, name: str, code: str, **groups: str) -> None:
         """Install the distribution and module ``name``; ``groups`` are entry points, as ``robots="scale = Scale"``."""
@@ -65,9 +71,13 @@ class Installed:
         command = [sys.executable, "-m", "handsteer", *words]
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=self._env, cwd=self._folder) as process:
             assert process.stderr is not None
-            found = (re.search(r"the page is at (http://[\w.:]+)", line) for line in process.stderr)
+            for line in process.stderr:
+                self.said.append(line)
+                if found := re.search(r"the page is at (http://[\w.:]+)", line):
+                    break
             try:
-                yield next(filter(None, found))[1]
+                assert found, "".join(self.said)
+                yield found[1]
             finally:
                 process.terminate()
                 try:
@@ -169,20 +179,23 @@ FAILING = """
 class Breaks:
     effect = "breaks"
 
-    def velocity(self, now, shown_s):
+    def velocity(self, now, since_last_s):
         {body}
 """
 
 
 @pytest.mark.parametrize("body", ["raise ValueError('broken')", "return None", "return type(now)(float('nan'), 1.0)"])
-def test_an_action_that_fails_stops_the_robot(installed: Installed, body: str) -> None:
+def test_an_action_that_fails_stops_the_robot(
+    installed: Installed, body: str, caplog: pytest.LogCaptureFixture
+) -> None:
     from handsteer.control.sign_control import SignControl  # noqa: PLC0415
 
     installed.add(f"breaking{len(body)}", FAILING.format(body=body), actions="breaks = Breaks")
     control = SignControl(Config().control.model_copy(update={"actions": {"Go": "breaks"}}))
     assert control.step("Forward", 0.03) == Velocity(0.01, 0.0)
-    assert control.step("Go", 0.03) == Velocity()
+    assert [control.step("Go", 0.03) for _ in range(5)] == [Velocity()] * 5
     assert control.velocity == Velocity()
+    assert caplog.text.count("the action breaks has failed: the robot stops") <= 1
 
 
 @pytest.mark.slow
@@ -292,6 +305,28 @@ def test_parameters_may_be_in_the_module_of_a_verb_or_transport(installed: Insta
         "torch", example("Parameters") + example("Transport"), parameters="torch = Lamp", transports="t = Alone"
     )
     assert "--torch.brightness" in installed.run("parameters", "torch").stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "imported",
+    [
+        "handsteer.graph import Graph",
+        "handsteer import Recognizer, Teleop",
+        "handsteer.making import make_control",
+        "handsteer.plugins.page.page import Page",
+    ],
+)
+@pytest.mark.parametrize("verb", ["run", "signs list", "control --transport dds"])
+def test_parameters_may_be_in_a_module_that_imports_any_other(installed: Installed, imported: str, verb: str) -> None:
+    installed.add("mine", f"from {imported}\n{example('Parameters')}", parameters="lamp = Lamp")
+    file = installed.file("my.yaml", f"lamp: {{brightness: {0.7 if verb == 'run' else 7}}}")
+    if verb == "run":
+        with installed.started("run", "--camera", "virtual", "--port", "0", "--config", file) as address:
+            urllib.request.urlopen(address).close()
+        assert not [line for line in installed.said if "lamp" in line]
+    else:
+        assert "lamp.brightness: 7 should be" in installed.run(*verb.split(), "--config", file, code=2).stderr
 
 
 def test_an_unknown_name_gets_the_nearest(installed: Installed) -> None:

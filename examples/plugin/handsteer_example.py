@@ -55,6 +55,6 @@ class DrawingCamera:  # --camera drawing
 class Blink:  # --control.actions.Go blink
     effect = "blinks; goes on as it does"
 
-    def velocity(self, now: Velocity, _shown_s: float) -> Velocity:
+    def velocity(self, now: Velocity, _since_last_s: float) -> Velocity:
         print("blink", flush=True)
         return now

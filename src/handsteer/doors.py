@@ -46,14 +46,14 @@ class SignAction(Protocol):
 
     effect: str
 
-    def velocity(self, now: "Velocity", shown_s: float) -> "Velocity":
+    def velocity(self, now: "Velocity", since_last_s: float) -> "Velocity":
         """Return the velocity to command for one message with the sign; the limits of the control apply to it.
 
         It is called on the control's thread, so it must return at once. The robot stops if it raises.
 
         Args:
             now: The velocity that is commanded so far.
-            shown_s: Seconds since the last message with a sign, 0 for the first.
+            since_last_s: Seconds since the last message with a sign, at most the time of a sign; 0 for the first.
         """
         ...
 

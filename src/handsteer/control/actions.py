@@ -15,6 +15,7 @@ class AddedActions:
 
     def __init__(self) -> None:
         self._made: dict[str, doors.SignAction] = {}
+        self._failed: set[tuple[str, type[Exception]]] = set()
 
     def make(self, actions: Iterable[str]) -> None:
         """Make those of ``actions`` that are new here and not built in; they are kept from then on.
@@ -30,13 +31,18 @@ class AddedActions:
                 reason = f"{type(error).__name__}: {error}"
                 raise PluginError(f"the action {name} cannot be made: {reason}") from error
 
-    def velocity(self, name: str, now: Velocity, shown_s: float) -> Velocity:
-        """Return the velocity that the action ``name`` wants, zero if it fails; its arguments are the action's."""
+    def velocity(self, name: str, now: Velocity, since_last_s: float) -> Velocity:
+        """Return the velocity that the action ``name`` wants; zero if it fails, which is logged once for each cause.
+
+        The other arguments are the action's.
+        """
         try:
-            wanted = self._made[name].velocity(now, shown_s)
+            wanted = self._made[name].velocity(now, since_last_s)
             return wanted if wanted.is_finite else ZERO
-        except Exception:
-            log.exception("the action %s has failed: the robot stops", name)
+        except Exception as error:
+            if (name, type(error)) not in self._failed:
+                self._failed.add((name, type(error)))
+                log.exception("the action %s has failed: the robot stops", name)
             return ZERO
 
 
