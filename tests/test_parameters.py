@@ -1,4 +1,5 @@
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -67,6 +68,27 @@ def test_no_parameter_is_hidden_by_a_section_of_the_same_name() -> None:
 def test_the_defaults_of_each_section_pass(section: str) -> None:
     defaults = getattr(Config(), section).model_dump(exclude_none=True)
     assert config.load(None, None, from_parameters(defaults, section, "/node")) == Config()
+
+
+@pytest.mark.parametrize("section", list(Config.model_fields))
+def test_what_a_node_gives_is_taken_at_a_start(section: str) -> None:
+    """As by ``ros2 param dump`` and ``--params-file``: what is None is given as an empty text."""
+    given: dict[str, Any] = {}
+    for name, value in NodeParameters(Config(), section, lambda _: None).values().items():
+        table = given
+        *above, last = name.split(".")
+        for each in above:
+            table = table.setdefault(each, {})
+        table[last] = value
+    assert config.load(None, None, from_parameters(given, section, "/node")) == Config()
+
+
+def test_a_file_can_be_taken_away_again(tmp_path: Path) -> None:
+    applied: list[Config] = []
+    parameters = NodeParameters(Config(), "signs", applied.append)
+    parameters.set({"profile": str(tmp_path / "anna.npz")})
+    parameters.set({"profile": ""})
+    assert [each.signs.profile for each in applied] == [tmp_path / "anna.npz", None]
 
 
 def test_what_is_set_is_what_the_node_gets() -> None:
