@@ -102,3 +102,9 @@ def test_a_wrong_value_has_its_full_name(kind: str, given: dict[str, Any]) -> No
     (name,) = given
     with pytest.raises(ConfigError, match=f"^ROS parameter /r1/{kind}/{name}: .* should be "):
         told(kind, given)
+
+
+@pytest.mark.parametrize("given", [5, [1], "all"])
+def test_a_value_in_place_of_all_parameters_is_refused(given: Any) -> None:
+    with pytest.raises(ConfigError, match=f"^ROS parameter /r1/{CONTROL}: .* should be the node's parameters by name"):
+        told(CONTROL, given)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from handsteer.errors import ConfigError
+from handsteer.errors import ConfigError, quoted
 from handsteer.messages import CMD_VEL, HAND_SIGN, IMAGE_ANNOTATED, IMAGE_RAW, ODOM, Topic
 
 _TOPICS: dict[str, dict[str, Topic[Any]]] = {
@@ -49,8 +49,10 @@ def translate(kind: str, node: str, parameters: Mapping[str, Any], read: Callabl
         read: Returns a parameter of the node's namespace by its relative name, or None if there is none.
 
     Raises:
-        ConfigError: A name of a topic or a file is invalid.
+        ConfigError: A name of a topic or a file is invalid, or the parameters are not a table.
     """
+    if not isinstance(parameters, Mapping):
+        raise ConfigError(f"ROS parameter {node}: {quoted(parameters)} should be the node's parameters by name")
     found = Translation(dict(parameters))
     for name, topic in _TOPICS.get(kind, {}).items():
         if name in found.parameters:
