@@ -4,6 +4,7 @@ All timing uses :meth:`Clock.now`, which is monotonic. :meth:`Clock.stamp` conve
 ``builtin_interfaces/Time`` of message headers, and :meth:`Clock.time_of` converts it back.
 """
 
+import logging
 import math
 import threading
 import time
@@ -25,6 +26,8 @@ _PAUSED_S = 0.4
 _LEAST_SET_S = 1.0
 # More than every timeout of what moves the robot.
 _RESTART_S = 1.0
+
+log = logging.getLogger(__name__)
 
 
 class Clock(Protocol):
@@ -233,6 +236,7 @@ class ClockWatch:
         self._correction_s = 0.0
         self._trusted: tuple[float, float] | None = None
         self._watched: tuple[float, float] | None = None
+        self._seen_s = -math.inf
 
     def corrected(self, age_s: float, now_s: float) -> float | None:
         """Return the corrected age of a message; None while a change of the clock is being measured.
@@ -241,12 +245,15 @@ class ClockWatch:
             age_s: Time of arrival minus that of the stamp, in seconds, on any two clocks.
             now_s: Time of arrival, in seconds of a monotonic clock.
         """
+        gap_s, self._seen_s = now_s - self._seen_s, now_s
         if self._watched is not None:
             first_age_s, since_s = self._watched
-            if abs(age_s - first_age_s) > STALE_S:  # a single late message, not the clock
+            # A single late message, not the clock; or too few to tell.
+            if abs(age_s - first_age_s) > STALE_S or gap_s > 2 * RESYNC_S:
                 self._watched = None
             elif now_s - since_s >= RESYNC_S:
                 self._correction_s += self.set_by_s
+                log.warning("%s: the stamps of its messages are corrected by that", clock_change(self.set_by_s))
                 self._watched = self._trusted = None
         # What broke off a measurement is compared with the last trusted message, not with one that may be wrong itself.
         if self._watched is None and self._trusted is not None and self._was_set(*self._trusted, age_s, now_s):
@@ -260,6 +267,11 @@ class ClockWatch:
         set_back_s = age_s - last_age_s - (now_s - last_s)
         is_ahead, was_ahead = (age - self._correction_s < -_LEAST_SET_S for age in (age_s, last_age_s))
         return set_back_s > _LEAST_SET_S or (self._in_step and is_ahead and not was_ahead)
+
+
+def clock_change(set_by_s: float) -> str:
+    """Return in words that a clock was set back by ``set_by_s`` seconds, or ahead if negative."""
+    return f"a clock was set {'back' if set_by_s > 0 else 'ahead'} by {abs(set_by_s):.1f} s"
 
 
 def to_stamp(seconds: float) -> "Time":

@@ -91,6 +91,7 @@ class Topic(Generic[M]):
             image_transport.
         or_type: Another message class that its publisher may use instead, depending on subscribers; None if it has one.
         stops: Returns whether a message stops the robot, and is therefore obeyed however late; None if none does.
+        any_reliability: Whether subscribers also receive what is published best effort, next to what is reliable.
     """
 
     name: str
@@ -102,6 +103,7 @@ class Topic(Generic[M]):
     beneath: "Topic[Any] | None" = None
     stops: Callable[[Any], bool] | None = None
     or_type: builtins.type[Any] | None = None
+    any_reliability: bool = False
 
     def moved_with(self, beneath: str) -> str:
         """Return its full name if the topic that it is ``beneath`` has the full name ``beneath``."""
@@ -162,7 +164,7 @@ CMD_VEL = Topic("/robot_diff_drive_controller/cmd_vel", Twist, depth=10, lifespa
 SELECT_ROBOT = Topic("/select_robot", String, depth=10)
 SELECTED_ROBOT = Topic("/selected_robot", String, latched=True)
 # True stops the robot and overrides all inputs; false ends the Stop. No message may be lost.
-STOP = Topic("/stop", Bool, depth=10, stops=is_set)
+STOP = Topic("/stop", Bool, depth=10, stops=is_set, any_reliability=True)
 # The state of /stop that each node remembers and publishes, for nodes that restart.
 STOPPED = Topic("/stopped", Bool, latched=True)
 # A pad begins with a zero, which must not be replaced by the deflection that follows.

@@ -37,6 +37,7 @@ from handsteer.recognition.custom_signs import save_custom_model
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
+from handsteer.transports.base import Received
 from handsteer.types import FORWARD, RELEASED
 from tests.nodes.stepping import Bench
 from tests.recognition.hands import RecordedLandmarker, show_fingers, show_sign
@@ -626,6 +627,23 @@ def test_an_unsupported_encoding_is_one_line_with_what_to_do(encoding: str, capl
     assert record.exc_info is None
     assert "use one of bgr8" in record.getMessage()
     assert record.getMessage().isprintable()
+    assert "use one of bgr8" in bench.node._report().refused
+
+
+def test_a_recording_that_is_played_beside_a_silent_camera_is_not_that_of_a_clock_that_was_set() -> None:
+    """The guard: ``is_late`` in ``_on_frame``, which transports set for old frames from among several publishers."""
+    bench = RecognitionBench()
+    bench.show(frames=6)
+    assert bench.names[-1] == "Forward"
+    bench.run(1.0)
+    bench.signs.clear()
+    for _ in range(150):
+        image = image_message(bench.picture(), HEADER)
+        played = Received(image, bench.clock.now() - 9 * 365 * 86_400.0, is_late=True)
+        bench.transport._fanouts[IMAGE_RAW.name].send(played)
+        bench.run(1 / 30)
+    assert set(bench.names) == {"NONE"}
+    assert "played next to another publisher" in bench.node._report().refused
 
 
 def test_a_picture_that_was_passed_over_is_not_new_when_it_comes_again(bench: RecognitionBench) -> None:

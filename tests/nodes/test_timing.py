@@ -133,6 +133,19 @@ def test_a_clock_that_is_set_while_frames_come_is_followed_after_a_second(set_by
     assert set(told[121:]) == {None}
 
 
+def test_a_few_old_frames_with_a_long_pause_between_are_no_clock_that_was_set(caplog: pytest.LogCaptureFixture) -> None:
+    age = FrameAge(LIMIT_S)
+    assert all(age.why_refused(number * PERIOD_S, number * PERIOD_S) is None for number in range(30))
+    for began_s in (10.0, 20.0, 30.0):
+        for number in range(10):
+            now_s = began_s + number * PERIOD_S
+            assert age.why_refused(now_s, now_s - 3600.0) is not None
+    assert "corrected" not in caplog.text
+    told = [age.why_refused(40.0 + number * PERIOD_S, number * PERIOD_S - 3560.0) for number in range(40)]
+    assert told[-1] is None
+    assert "a clock was set back by 3600.0 s: the stamps of its messages are corrected by that" in caplog.text
+
+
 def test_a_queue_that_stood_still_is_no_clock_that_was_set() -> None:
     age = FrameAge(LIMIT_S)
     assert all(age.why_refused(number * PERIOD_S, number * PERIOD_S) is None for number in range(30))

@@ -18,7 +18,7 @@ from tests.contracts.node_contract import (
     ChainContract,
     Running,
 )
-from tests.contracts.ros2_node_contract import NODE, SCRIPT, Ros2NodeContract, driving_chain
+from tests.contracts.ros2_node_contract import NODE, SCRIPT, DdsDriver, Ros2NodeContract, driving_chain
 from tests.processes import eventually
 from tests.ros2.graph import NEEDS_ROS2, TRANSPORTS, Ros2Graph, needs_tf2_msgs
 
@@ -199,16 +199,53 @@ def test_what_a_node_logs_is_on_rosout(dds: Ros2Graph) -> None:
     assert logged[0][2].startswith("/told/image_raw: nothing passes")
 
 
-def test_profiles_that_do_not_fit_are_said_in_words(dds: Ros2Graph) -> None:
-    dds.peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5, latched=True)
-    camera = dds.node("camera", *VIRTUAL, name="/my_camera")
+def test_profiles_that_do_not_fit_are_said_in_words(fresh: Ros2Graph) -> None:
+    fresh.peer.ask("record", topic="/image_raw", type="Image", fields=["width"], depth=5, latched=True)
+    camera = fresh.node("camera", *VIRTUAL, name="/my_camera")
     line = (
         "/image_raw: nothing passes between our publisher and the subscriber of /looker: "
         "the publisher is volatile, the subscriber wants transient local"
     )
     eventually(lambda: line in camera.text, 10.0, what=line)
     time.sleep(0.2)
-    assert dds.peer.ask("get", topic="/image_raw") == []
+    assert fresh.peer.ask("get", topic="/image_raw") == []
+
+
+def test_a_robot_that_cannot_hear_its_commands_is_named(fresh: Ros2Graph) -> None:
+    fresh.peer.ask("record", topic="/cmd_vel", type="TwistStamped", fields=["twist.linear.x"], latched=True)
+    control = fresh.node("control", name=f"/{NODE}", ros=("-r", f"{CMD_VEL[1:]}:=/cmd_vel"))
+    line = (
+        "/cmd_vel: nothing passes between our publisher and the subscriber of /looker: "
+        "the publisher is volatile, the subscriber wants transient local"
+    )
+    eventually(lambda: line in control.text, 10.0, what=line)
+    assert control.text.count("nothing passes") == 1
+
+
+def test_a_stop_that_is_published_best_effort_stops_once(fresh: Ros2Graph) -> None:
+    driver = DdsDriver(fresh, parameters={"sign_timeout": 5.0})
+    stop = driver.signs.replace("gesture/hand_sign", "stop")
+    fresh.peer.ask("advertise", topic=stop, type="Bool", reliable=False)
+    eventually(lambda: fresh.peer.ask("listeners", topic=stop) > 0, what="the control to listen")
+    driver.show("Forward")
+    driver.expect((0.01, 0.0))
+    fresh.peer.ask("publish", topic=stop, values={"data": True}, count=20, period_s=0.1)
+    driver.show("Forward")
+    eventually(lambda: driver.twists[-1] == (0.0, 0.0), what="the robot to be stopped")
+    assert "nothing passes" not in driver.process.text
+
+
+def test_a_stop_that_is_published_reliably_comes_once(fresh: Ros2Graph) -> None:
+    driver = DdsDriver(fresh, parameters={"sign_timeout": 5.0})
+    stop = driver.signs.replace("gesture/hand_sign", "stop")
+    fresh.peer.ask("advertise", topic=stop, type="Bool")
+    eventually(lambda: fresh.peer.ask("listeners", topic=stop) >= 2, what="the control to listen twice")
+    driver.show("Forward")
+    driver.expect((0.01, 0.0))
+    fresh.peer.ask("publish", topic=stop, values={"data": True})
+    eventually(lambda: driver.twists[-1] == (0.0, 0.0), what="the robot to be stopped")
+    time.sleep(0.5)
+    driver.expect((0.01, 0.0), (0.0, 0.0))
 
 
 def test_a_node_of_ros2_that_is_killed_is_no_harm(fresh: Ros2Graph) -> None:

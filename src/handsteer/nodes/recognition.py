@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from handsteer.clock import Clock
 from handsteer.config import Config, JoystickConfig, SignsConfig
 from handsteer.control.explain import Reason
-from handsteer.errors import ConfigError, ModelError, ProfileError
+from handsteer.errors import ConfigError, FrameError, ModelError, ProfileError
 from handsteer.images import bgr_image, image_message, jpeg_picture, mirrored
 from handsteer.messages import (
     GESTURE_JOY,
@@ -69,6 +69,8 @@ M = TypeVar("M", Image, CompressedImage)
 _MOST_PLAYED_BYTES = 2**28
 _REPORT_PLAYED_S = 5.0
 _SLOWER = "the recording is played faster than this machine recognises: play it at a lower rate (-r 0.5)"
+
+_BESIDE_PLAYER = "old frames do not count while a recording is played next to another publisher of the same topic"
 
 _FREEZE_EXPLAINED_S = 3.0
 # An older refusal no longer explains why there are no frames.
@@ -206,23 +208,37 @@ class HandSignRecognitionNode(Node):
         captured_s = received.captured_s if received.captured_s is not None else began_s
         self._stall_guard.note(began_s)
         if self._recording.follows(began_s, captured_s, by_player=received.by_player):
-            self._on_played(picture_of(received.message), received, began_s)
+            self._on_played(self._picture(received, picture_of, began_s), received, began_s)
             return
         self._played.end()
-        self._refused = self._age.why_refused(began_s, captured_s, is_far=self.is_camera_far)
-        if self._refused is not None:
-            self._refused = self._recording.hint(began_s) or self._refused
+        self._refused = (
+            _BESIDE_PLAYER
+            if received.is_late
+            else self._age.why_refused(began_s, captured_s, is_far=self.is_camera_far)
+        )
+        hint = None if self._refused is None else self._recording.hint(began_s)
+        if hint and not received.is_late:
+            self._refused = hint
         if self._refused is None and captured_s < self._camera_since_s:
             self._refused = "a picture of the camera before"
         if self._refused is None and self._stall_guard.distrusts(began_s):
             self._refused = f"{TOO_SLOW}: pictures may have waited"
-        image = picture_of(received.message)
+        image = self._picture(received, picture_of, began_s)
         if self._refused is None:
             self._look_at(image, received, began_s, self._since_last_frame(captured_s))
         else:
             self._pipeline.pass_over(mirrored(image) if self._config.swap_sides else image)
         if self._refused is not None:
             self._refused_s = began_s  # a stale or repeated frame does not count: the watchdog publishes NONE
+
+    def _picture(
+        self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]], began_s: float
+    ) -> NDArray[np.uint8]:
+        try:
+            return picture_of(received.message)
+        except FrameError as error:
+            self._refused, self._refused_s = str(error), began_s
+            raise  # to be logged
 
     def _on_played(self, image: NDArray[np.uint8], received: Received[M], began_s: float) -> None:
         """Process a frame of a recording: the result depends on the frames and their stamps alone."""

@@ -5,7 +5,7 @@ from collections import deque
 
 import numpy as np
 
-from handsteer.clock import ClockWatch
+from handsteer.clock import ClockWatch, clock_change
 from handsteer.config import Recorded
 from handsteer.messages import Time
 from handsteer.timeouts import BURST_S, DISTRUST_S, RECORDED_S, RESYNC_S, STALE_S
@@ -99,7 +99,7 @@ class FrameAge:
         self.ahead_s = max(0.0, self.ahead_s - _LEAK * elapsed_s)
         corrected_s = self._watch.corrected(now_s - captured_s, now_s)
         if corrected_s is None:
-            return f"{_clock_change(self._watch.set_by_s)}: frames are timed again in a moment"
+            return f"{clock_change(self._watch.set_by_s)}: frames are timed again in a moment"
         by_stamp_s = corrected_s
         if by_stamp_s < -self.limit_s:
             ahead = f"{-by_stamp_s:.1f} s ahead of our clock"
@@ -119,11 +119,6 @@ class FrameAge:
 def far_and_late(age_s: float) -> str:
     """Return in words that pictures of a browser's camera on another machine arrive ``age_s`` seconds late."""
     return f"Pictures of that device's camera arrive {age_s:.1f} s late: the network or that device may be slow"
-
-
-def _clock_change(set_by_s: float) -> str:
-    """Return in words that a clock was set back by ``set_by_s`` seconds, or ahead if negative."""
-    return f"a clock was set {'back' if set_by_s > 0 else 'ahead'} by {abs(set_by_s):.1f} s"
 
 
 class Recording:

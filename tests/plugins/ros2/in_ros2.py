@@ -13,6 +13,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String as TheirString
 
 from handsteer.clock import SimulatedClock
+from handsteer.config import Config
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CAMERA_INFO,
@@ -21,11 +22,13 @@ from handsteer.messages import (
     IMAGE_COMPRESSED,
     IMAGE_RAW,
     ROBOT_DESCRIPTION,
+    STOP,
     TF,
     String,
     TFMessage,
     Topic,
 )
+from handsteer.parameters import NodeParameters
 from handsteer.plugins.ros2.topics import publisher_qos, subscription_qos
 from handsteer.testing.transport_contract import SessionContract, eventually, heard
 from handsteer.transports import join
@@ -122,6 +125,29 @@ def test_parameters_come_from_files_and_words_and_those_of_ros_are_left_to_it(jo
     transport = session.transport
     publisher = transport.advertise("talker", HAND_SIGN)
     assert publisher._writer._publisher.qos_profile.depth == 3  # type: ignore[attr-defined]
+
+
+def test_an_empty_list_has_no_type_and_is_taken(joined: Join, tmp_path: Path) -> None:
+    """Of ``ros2 param dump``, for example: rclpy alone would not start with it."""
+    file = tmp_path / "my.yaml"
+    file.write_text("/**: {ros__parameters: {robots: [], names: {of: []}, max_linear: 0.5}}\n")
+    session = joined("--params-file", str(file))
+    assert session.parameters == {"robots": [], "names": {"of": []}, "max_linear": 0.5}
+
+
+def test_a_profile_can_be_overridden_of_what_is_opened_after_the_parameters_are_served(joined: Join) -> None:
+    session = joined("-p", "qos_overrides./stop.publisher.depth:=3", "-p", "qos_overrides./stop.subscription.depth:=4")
+    session.serve(NodeParameters(Config(), "control", lambda _: None))
+    publisher = session.transport.advertise("page", STOP)
+    session.transport.subscribe("page", STOP, lambda _: None)
+    assert publisher._writer._publisher.qos_profile.depth == 3  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("override", ["publisher.depth:=abc", "publisher.reliability:=abc", "publisher.depth:=1.5"])
+def test_a_profile_that_is_not_one_is_refused(joined: Join, override: str) -> None:
+    session = joined("-p", f"qos_overrides./stop.{override}")
+    with pytest.raises(TransportError, match=r"^/stop: "):
+        session.transport.advertise("page", STOP)
 
 
 def test_commands_live_for_less_than_the_robot_waits_and_what_is_latched_stays() -> None:

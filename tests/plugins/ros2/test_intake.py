@@ -1,11 +1,13 @@
 import time
 from typing import Any
 
+import numpy as np
 import pytest
 
 from handsteer.clock import RealClock
-from handsteer.messages import STEERING_CMD_VEL, STOP, Bool, Topic, twist
-from handsteer.plugins.ros2.base_transport import Intake
+from handsteer.images import image_message
+from handsteer.messages import IMAGE_RAW, STEERING_CMD_VEL, STOP, Bool, Header, Topic, twist
+from handsteer.plugins.ros2.base_transport import Intake, Once, Players
 from handsteer.transports.base import Received
 from handsteer.transports.encoding import encode
 
@@ -30,6 +32,38 @@ def test_of_late_messages_only_those_that_stop_are_sent_on_and_marked() -> None:
 def test_a_stop_is_sent_on_however_late() -> None:
     heard = taken(STOP, (Bool(data=False), 0.0), (Bool(data=True), 0.9))
     assert [each.message.data for each in heard] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("nodes", "is_late", "by_player"),
+    [
+        (["/my_camera"], False, False),
+        (["/rosbag2_player"], False, True),
+        (["/my_camera", "/rosbag2_player"], True, False),
+        (["/r1/rosbag2_player_1", "/rosbag2_player"], False, True),
+        ([], False, False),
+    ],
+)
+def test_old_images_count_if_players_are_the_only_publishers(nodes: list[str], is_late: bool, by_player: bool) -> None:
+    """The guard: ``are_among_others`` in ``Intake.take``: their age is not that of a clock that was set."""
+    heard: list[Received[Any]] = []
+    clock = RealClock()
+    intake = Intake(IMAGE_RAW, "/image_raw", clock, heard.append, Players(lambda: nodes))
+    for age_s in (3600.0, 0.1):
+        header = Header(stamp=clock.stamp(clock.now() - age_s), frame_id="")
+        intake.take(encode(image_message(np.zeros((4, 4, 3), np.uint8), header)), b"sender", time.time())
+    assert [each.is_late for each in heard] == [is_late, False]
+    assert [each.by_player for each in heard] == [by_player, by_player]
+
+
+def test_a_message_of_two_readers_is_passed_on_once() -> None:
+    """The guard: ``Once``."""
+    passed: list[float | None] = []
+    once = Once(lambda _raw, _sender, sent_s: passed.append(sent_s))
+    for sent_s in (1.0, 1.0, 2.0, 1.0, 2.0, 3.0, None, None):
+        once.take(b"stop", b"", sent_s)
+    once.take(b"reset", b"", 3.0)
+    assert passed == [1.0, 2.0, 3.0, None, None, 3.0]
 
 
 def test_a_message_that_cannot_be_read_is_left_out(caplog: pytest.LogCaptureFixture) -> None:

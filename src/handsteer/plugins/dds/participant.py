@@ -27,7 +27,7 @@ from handsteer.messages import Topic, type_name
 from handsteer.plugins.dds.discovery import Endpoint, Matching, RosGraph
 from handsteer.plugins.dds.network import Network
 from handsteer.plugins.dds.topics import dds_type, opaque_type, reader_qos, service_dds_type, service_qos, writer_qos
-from handsteer.plugins.ros2.base_transport import Other
+from handsteer.plugins.ros2.base_transport import Other, Profile
 from handsteer.transports.base import UNNAMED
 from handsteer.transports.encoding import NodeName, dds_type_name, reply_type, request_type, ros_type_name
 
@@ -83,9 +83,9 @@ class Participant:
         """Return a new writer of ``topic``, whose full name is ``name``; its messages have its ``data_type``."""
         return self._open(DataWriter, name, topic, writer_qos(topic), publishes=True)
 
-    def reader(self, name: str, topic: Topic[Any]) -> DataReader[Any]:
-        """Return a new reader of ``topic``, whose full name is ``name``."""
-        return self._open(DataReader, name, topic, reader_qos(topic), publishes=False)
+    def reader(self, name: str, topic: Topic[Any], profile: Profile) -> DataReader[Any]:
+        """Return a new reader of ``topic``, whose full name is ``name``; of two with a name, the last is compared."""
+        return self._open(DataReader, name, topic, reader_qos(topic, profile), publishes=False)
 
     def service(self, name: str, kind: str) -> tuple[DataReader[Any], DataWriter[Any]]:
         """Return a reader of the requests and a writer of the replies of the service of this full name and type."""

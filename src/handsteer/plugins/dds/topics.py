@@ -44,9 +44,9 @@ def writer_qos(topic: Topic[Any]) -> Qos:
     return Qos(*policies)
 
 
-def reader_qos(topic: Topic[Any]) -> Qos:
-    """Return the QoS requested by a subscriber of ``topic``."""
-    return _qos(topic, requested(topic))
+def reader_qos(topic: Topic[Any], profile: Profile | None = None) -> Qos:
+    """Return the QoS requested by a subscriber of ``topic``, by ``profile`` if it is not the usual one."""
+    return _qos(topic, profile or requested(topic))
 
 
 def discovery_qos(name: str, depth: int) -> Qos:

@@ -22,7 +22,7 @@ from handsteer.messages import Topic
 from handsteer.plugins.dds.network import network
 from handsteer.plugins.dds.participant import Participant
 from handsteer.plugins.dds.topics import user_data
-from handsteer.plugins.ros2.base_transport import Other, Take, WireTransport
+from handsteer.plugins.ros2.base_transport import Other, Profile, Take, WireTransport
 from handsteer.transports.encoding import NodeName
 
 _REQUESTS_AT_ONCE = 100
@@ -51,8 +51,8 @@ class DdsTransport(WireTransport):
     def _open_writer(self, name: str, topic: Topic[Any]) -> "_Writer":
         return _Writer(self._participant, name, topic)
 
-    def _open_reader(self, name: str, topic: Topic[Any], take: Take) -> Callable[[], None]:
-        reader = self._participant.reader(name, topic)
+    def _open_reader(self, name: str, topic: Topic[Any], profile: Profile, take: Take) -> Callable[[], None]:
+        reader = self._participant.reader(name, topic, profile)
 
         def serve() -> None:
             for sample in reader.take(topic.depth):

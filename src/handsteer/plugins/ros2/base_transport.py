@@ -11,8 +11,9 @@ import re
 import threading
 import time
 from abc import abstractmethod
+from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
 from handsteer.clock import Clock
@@ -28,6 +29,7 @@ from handsteer.messages import (
     Topic,
     type_name,
 )
+from handsteer.timeouts import STALE_S
 from handsteer.transports.base import Deliver, Received
 from handsteer.transports.encoding import NodeName, compile_type, decode, encode
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
@@ -43,6 +45,7 @@ _IMAGES_KEPT = 3
 _LAST_S = 0.2
 _PLAYER = re.compile(r"(/\w+)*/rosbag2_player\w*", re.ASCII)
 _PLAYERS_KNOWN_S = 0.25
+_REMEMBERED = 64
 
 log = logging.getLogger(__name__)
 
@@ -140,6 +143,8 @@ class Ros2Transport(BaseTransport):
 
     errors: ClassVar[tuple[type[Exception], ...]]
     """Exceptions of a :class:`Writer` that cannot send."""
+    connects_by_qos: ClassVar[bool] = True
+    """Whether a publisher that is best effort and a subscriber that is reliable are not connected."""
 
     def __init__(self, node: str, clock: Clock) -> None:
         super().__init__(set())
@@ -177,14 +182,29 @@ class Ros2Transport(BaseTransport):
     def _reception(self, node: str, name: str, topic: Topic[M]) -> Receive[M]:
         compile_type(type_name(topic.type))
         players = Players(lambda: self.publishers_of(topic)) if topic.type in IMAGES else None
-        return lambda send: self._open_reader(name, topic, Intake(topic, name, self._clock, send, players).take)
+        profile = requested(topic)
+
+        def receive(send: Deliver[M]) -> Callable[[], None]:
+            take = Intake(topic, name, self._clock, send, players).take
+            if not (topic.any_reliability and self.connects_by_qos):
+                return self._open_reader(name, topic, profile, take)
+            once = Once(take).take
+            ends = [self._open_reader(name, topic, replace(profile, reliable=each), once) for each in (True, False)]
+
+            def close() -> None:
+                for end in ends:
+                    end()
+
+            return close
+
+        return receive
 
     @abstractmethod
     def _open_writer(self, name: str, topic: Topic[Any]) -> Writer | None:
         """Return a new writer of ``topic``, whose full name is ``name``; None if there can be no subscribers."""
 
     @abstractmethod
-    def _open_reader(self, name: str, topic: Topic[Any], take: "Take") -> Callable[[], None]:
+    def _open_reader(self, name: str, topic: Topic[Any], profile: Profile, take: "Take") -> Callable[[], None]:
         """Call ``take`` with the messages of ``topic``, on one thread at a time; return a function that ends it."""
 
     @abstractmethod
@@ -254,13 +274,33 @@ Take = Callable[[bytes, bytes, float | None], None]
 """Takes an encoded message, an identifier of its sender, and the time of sending, as :meth:`Intake.take`."""
 
 
+class Once:
+    """Passes on what two readers of one topic receive, each message once.
+
+    Args:
+        take: As :meth:`Intake.take`.
+    """
+
+    def __init__(self, take: Take) -> None:
+        self._take = take
+        self._taken: deque[tuple[bytes, float]] = deque(maxlen=_REMEMBERED)
+
+    def take(self, raw: bytes, sender: bytes, sent_s: float | None) -> None:
+        """Process one message; without a time of sending it may come twice."""
+        if sent_s is not None:
+            if (raw, sent_s) in self._taken:
+                return
+            self._taken.append((raw, sent_s))
+        self._take(raw, sender, sent_s)
+
+
 def are_players(nodes: Sequence[str]) -> bool:
     """Return whether these nodes, by their full names, are players of recordings: ``ros2 bag play``."""
     return bool(nodes) and all(_PLAYER.fullmatch(node) for node in nodes)
 
 
 class Players:
-    """Whether only players of recordings publish a topic, looked up a few times a second at most.
+    """Whether players of recordings publish a topic, looked up a few times a second at most.
 
     Args:
         publishers: Returns the full names of the nodes that publish it.
@@ -269,14 +309,22 @@ class Players:
     def __init__(self, publishers: Callable[[], Sequence[str]]) -> None:
         self._publishers = publishers
         self._looked_s = -math.inf
-        self._are_alone = False
+        self._known: Sequence[str] = ()
 
     def are_alone(self) -> bool:
-        """Return whether no other node publishes it."""
+        """Return whether there are some, and no other node publishes it."""
+        return are_players(self._look())
+
+    def are_among_others(self) -> bool:
+        """Return whether there are some, and other nodes publish it too."""
+        nodes = self._look()
+        return any(map(_PLAYER.fullmatch, nodes)) and not are_players(nodes)
+
+    def _look(self) -> Sequence[str]:
         now_s = time.monotonic()
         if now_s - self._looked_s >= _PLAYERS_KNOWN_S:
-            self._looked_s, self._are_alone = now_s, are_players(self._publishers())
-        return self._are_alone
+            self._looked_s, self._known = now_s, self._publishers()
+        return self._known
 
 
 class Intake(Generic[M]):
@@ -315,7 +363,11 @@ class Intake(Generic[M]):
             return
         if not is_late or (self._topic.stops is not None and self._topic.stops(message)):
             captured_s = capture_time(message, self._clock)
-            is_played = captured_s is not None and self._players is not None and self._players.are_alone()
+            is_played = False
+            if captured_s is not None and self._players is not None:
+                is_played = self._players.are_alone()
+                # Old stamps that advance would otherwise look like those of a camera whose clock was set.
+                is_late = self._players.are_among_others() and self._clock.now() - captured_s > STALE_S
             self._send(Received(message, captured_s, is_late=is_late, by_player=is_played))
 
     def _is_late(self, sender: bytes, sent_s: float | None) -> bool:

@@ -28,7 +28,7 @@ from handsteer.errors import ConfigError, HandsteerError, TransportError
 from handsteer.parameters import Description, NodeParameters, Value
 from handsteer.plugins.ros2.arguments import nested
 from handsteer.plugins.ros2.parameter_services import TYPES, descriptor
-from handsteer.plugins.ros2.topics import RclpyTransport, ros_class
+from handsteer.plugins.ros2.topics import RclpyTransport, is_opening, ros_class
 from handsteer.transports.base import Call, Managed, Session
 from handsteer.transports.encoding import encode
 from handsteer.transports.timing import ClockMonitor
@@ -152,6 +152,8 @@ class RclpySession(Session):
     def wait(self, timeout_s: float) -> bool:
         """Wait for at most ``timeout_s`` seconds; return whether rclpy has been shut down, or this session closed."""
         self._clock_monitor.check()
+        if not self._left.is_set() and self._context.ok():
+            self.transport.check()
         return self._left.wait(timeout_s) or not self._context.ok()
 
     def close(self) -> None:
@@ -211,9 +213,18 @@ def _answer(call: Call, _request: Any, reply: Any) -> Any:
 class LateManagedNode(LifecycleNodeMixin, Node):  # type: ignore[misc]
     """A node of rclpy that becomes a managed one only by :meth:`manage`, after its parameters are known."""
 
+    emptied: frozenset[str] = frozenset()
+    """Parameters that were given as an empty list at the start, for which rclpy knows no type."""
+
     def __init__(self, name: str, **options: Any) -> None:
         Node.__init__(self, name, **options)
         self._managed: Managed | None = None
+
+    def declare_parameters(self, namespace: str, parameters: Any, ignore_override: bool = False) -> Any:
+        """Declare all but empty lists, at which rclpy would not start, and remember these."""
+        self.emptied |= {each[0] for each in parameters if len(each) > 1 and each[1] is None}
+        known = [each for each in parameters if each[0] not in self.emptied]
+        return super().declare_parameters(namespace, known, ignore_override)
 
     def manage(self, node: Managed) -> None:
         """Offer the services of ``ros2 lifecycle``, which activate and deactivate ``node``."""
@@ -285,7 +296,8 @@ def take_given(node: Node) -> dict[str, Any]:
     found = {name: given for name, given in node.get_parameters_by_prefix("").items() if not _is_of_ros(name)}
     for name in found:
         node.undeclare_parameter(name)
-    return nested({name: _plain(given) for name, given in found.items()})
+    values: dict[str, Any] = {name: _plain(given) for name, given in found.items()}
+    return nested(values | {name: [] for name in getattr(node, "emptied", ())})
 
 
 class ParameterLink:
@@ -345,7 +357,8 @@ class ParameterLink:
             if not _is_of_ros(one.name):
                 continue
             is_set = self._node.has_parameter(one.name)
-            if self._node.get_parameter(one.name).value != one.value if is_set else one.name.startswith(_QOS):
+            is_late = one.name.startswith(_QOS) and not is_opening()
+            if self._node.get_parameter(one.name).value != one.value if is_set else is_late:
                 raise ConfigError(f"{one.name} cannot be set: it is only read when the node starts")
 
 

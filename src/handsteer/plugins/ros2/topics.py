@@ -2,15 +2,18 @@
 
 import importlib
 import logging
+import math
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
-from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.exceptions import InvalidTopicNameException
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidTopicNameException, ParameterException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
@@ -22,6 +25,8 @@ from handsteer.plugins.ros2.base_transport import IMAGES, Profile, Ros2Transport
 
 _LOOK_S = 0.25
 _PLAYED_KEPT = 200
+_COMPARE_S = 1.0
+_opening = threading.local()
 
 log = logging.getLogger(__name__)
 
@@ -34,9 +39,14 @@ def publisher_qos(topic: Topic[Any]) -> QoSProfile:
     return qos
 
 
-def subscription_qos(topic: Topic[Any]) -> QoSProfile:
-    """Return the QoS requested by a subscription to ``topic``."""
-    return _qos(requested(topic))
+def subscription_qos(topic: Topic[Any], profile: Profile | None = None) -> QoSProfile:
+    """Return the QoS requested by a subscription to ``topic``, by ``profile`` if it is not the usual one."""
+    return _qos(profile or requested(topic))
+
+
+def is_opening() -> bool:
+    """Return whether this thread is opening a publisher or a subscription, which declares its ``qos_overrides``."""
+    return getattr(_opening, "now", False)
 
 
 def _qos(profile: Profile) -> QoSProfile:
@@ -63,6 +73,9 @@ class RclpyTransport(Ros2Transport):
         self._node = node
         self._missing: set[str] = set()
         self._is_open = True
+        self._ends: dict[tuple[str, bool], _End] = {}
+        self._compared_s = -math.inf
+        self._reported: set[tuple[int, ...]] = set()
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
         """Return the full names of the ROS 2 nodes that publish ``topic``; killed ones remain for a while."""
@@ -87,19 +100,19 @@ class RclpyTransport(Ros2Transport):
         kind = self._class_of(name, topic)
         if kind is None:
             return None
-        with _refusals(name):
+        with _open(name):
             publisher = self._node.create_publisher(
                 kind,
                 self._unresolved(topic),
                 publisher_qos(topic),
-                # Event callbacks would keep a reference in the executor, and with it the publisher and the type of its
-                # topic.
-                event_callbacks=PublisherEventCallbacks(use_default_callbacks=topic.or_type is None),
+                # They would keep a reference in the executor, and with it the publisher and the type of its topic;
+                # :meth:`check` names the other node, too.
+                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
                 qos_overriding_options=self._overriding(name),
             )
-        return _Writer(self._node, publisher)
+        return _Writer(self._node, publisher, self._compare(_End(name, topic, publisher.qos_profile), publishes=True))
 
-    def _open_reader(self, name: str, topic: Topic[Any], take: Take) -> Callable[[], None]:
+    def _open_reader(self, name: str, topic: Topic[Any], profile: Profile, take: Take) -> Callable[[], None]:
         kind = self._class_of(name, topic)
         if kind is None:
             return lambda: None
@@ -109,20 +122,60 @@ class RclpyTransport(Ros2Transport):
             take(raw, b"", sent_ns / 1e9 if sent_ns > 0 else None)
 
         def open_(on_message: Callable[[bytes, Mapping[str, int]], None], qos: QoSProfile) -> Any:
-            with _refusals(name):
-                return self._node.create_subscription(
+            with _open(name):
+                opened = self._node.create_subscription(
                     kind,
                     self._unresolved(topic),
                     on_message,
                     qos,
+                    event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
                     qos_overriding_options=self._overriding(name),
                     raw=True,
                 )
+            # Of two, the second one takes what the first one does not.
+            ends.append(self._compare(_End(name, topic, opened.qos_profile), publishes=False))
+            return opened
 
+        ends: list[Callable[[], None]] = []
+        qos = subscription_qos(topic, profile)
         if topic.type in IMAGES:
-            return _Images(self._node, self._unresolved(topic), subscription_qos(topic), open_, on_message).close
-        subscription = open_(on_message, subscription_qos(topic))
-        return lambda: self._node.destroy_subscription(subscription)
+            ends.append(_Images(self._node, self._unresolved(topic), qos, open_, on_message).close)
+        else:
+            subscription = open_(on_message, qos)
+            ends.append(lambda: self._node.destroy_subscription(subscription))
+
+        def close() -> None:
+            for end in ends:
+                end()
+
+        return close
+
+    def _compare(self, end: "_End", *, publishes: bool) -> Callable[[], None]:
+        """Compare our ``end`` of a topic with those of others, see :meth:`check`; return a function that ends it."""
+        key = (end.name, publishes)
+        self._ends[key] = end
+
+        def forget() -> None:
+            if self._ends.get(key) is end:
+                del self._ends[key]
+
+        return forget
+
+    def check(self) -> None:
+        """Log who is not connected to our publishers and subscriptions, once; called regularly."""
+        now_s = time.monotonic()
+        if now_s - self._compared_s < _COMPARE_S:
+            return
+        self._compared_s = now_s
+        node = self._node
+        for (name, publishes), end in tuple(self._ends.items()):
+            others = (node.get_subscriptions_info_by_topic if publishes else node.get_publishers_info_by_topic)(name)
+            for theirs in others:
+                gid = tuple(theirs.endpoint_gid)
+                found = [] if gid in self._reported else _misfits(end, theirs, publishes=publishes)
+                if found:
+                    self._reported.add(gid)
+                    log.warning("%s", _explained(end, theirs, found, publishes=publishes))
 
     def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
         found = self._node.get_subscriptions_info_by_topic(self._unresolved(topic))
@@ -206,9 +259,10 @@ class _Images:
 
 
 class _Writer:
-    def __init__(self, node: Node, publisher: Any) -> None:
+    def __init__(self, node: Node, publisher: Any, on_close: Callable[[], None]) -> None:
         self._node = node
         self._publisher = publisher
+        self._on_close = on_close
 
     @property
     def has_readers(self) -> bool:
@@ -224,6 +278,7 @@ class _Writer:
             return True
 
     def close(self) -> None:
+        self._on_close()
         self._node.destroy_publisher(self._publisher)
 
 
@@ -238,10 +293,62 @@ def ros_class(name: str) -> Any | None:
     return found if hasattr(type(found), "__import_type_support__") else None
 
 
+class _End(NamedTuple):
+    """Our publisher of a topic, or our subscription to it: its full name, the topic, and the profile in use."""
+
+    name: str
+    topic: Topic[Any]
+    qos: QoSProfile
+
+
+def _misfits(ours: _End, theirs: Any, *, publishes: bool) -> list[str]:
+    """Return why our end is not connected to one of another node, in words; empty if it is."""
+    known = {type_name(each) for each in (ours.topic.type, ours.topic.or_type) if each is not None}
+    if theirs.topic_type not in known:
+        return [f"ours has the type {type_name(ours.topic.type)}, theirs {theirs.topic_type}"]
+    offer, request = (ours.qos, theirs.qos_profile) if publishes else (theirs.qos_profile, ours.qos)
+    # rclpy's own comparison takes an endless deadline for one where the other's is given as zero.
+    return [
+        f"the publisher is {offered}, the subscriber wants {wanted}"
+        for offered, wanted in zip(_in_words(offer), _in_words(request), strict=True)
+        if (offered, wanted) in (("best effort", "reliable"), ("volatile", "transient local"))
+    ]
+
+
+def _explained(ours: _End, theirs: Any, reasons: list[str], *, publishes: bool) -> str:
+    mine, other = ("publisher", "subscriber") if publishes else ("subscriber", "publisher")
+    who = f"{theirs.node_namespace.rstrip('/')}/{theirs.node_name}"
+    profiles = f"(ours: {', '.join(_in_words(ours.qos))}; theirs: {', '.join(_in_words(theirs.qos_profile))})"
+    return f"{ours.name}: nothing passes between our {mine} and the {other} of {who}: {'; '.join(reasons)} {profiles}"
+
+
+def _in_words(qos: QoSProfile) -> list[str]:
+    return [str(each.name).lower().replace("_", " ") for each in (qos.reliability, qos.durability)]
+
+
+@contextmanager
+def _open(name: str) -> Iterator[None]:
+    """Open a publisher or a subscription of the topic of this name."""
+    _opening.now = True
+    try:
+        with _refusals(name):
+            yield
+    finally:
+        _opening.now = False
+
+
 @contextmanager
 def _refusals(name: str) -> Iterator[None]:
     """Convert rclpy's exceptions about the topic of this name to our errors."""
     try:
         yield
-    except (InvalidTopicNameException, InvalidQosOverridesError, RuntimeError, ValueError) as error:
+    except AssertionError:  # a depth that is a text
+        raise TransportError(f"{name}: a value of qos_overrides has the wrong type") from None
+    except (
+        InvalidTopicNameException,
+        InvalidQosOverridesError,
+        ParameterException,
+        RuntimeError,
+        ValueError,
+    ) as error:
         raise TransportError(f"{name}: {' '.join(str(error).split())}") from None

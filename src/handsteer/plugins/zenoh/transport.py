@@ -17,7 +17,7 @@ import zenoh.ext
 
 from handsteer.clock import Clock
 from handsteer.messages import Topic, type_name
-from handsteer.plugins.ros2.base_transport import IMAGES, Other, Profile, Take, WireTransport, offered, requested
+from handsteer.plugins.ros2.base_transport import IMAGES, Other, Profile, Take, WireTransport, offered
 from handsteer.plugins.zenoh.configuration import network
 from handsteer.plugins.zenoh.keys import attachment, gid, read_attachment
 from handsteer.plugins.zenoh.member import Member
@@ -36,6 +36,7 @@ class ZenohTransport(WireTransport):
     """A :class:`~handsteer.transports.base.Transport` over Zenoh, which delivers on one thread per topic."""
 
     errors = (zenoh.ZError,)
+    connects_by_qos = False
 
     def __init__(self, name: NodeName, clock: Clock) -> None:
         super().__init__(name, clock)
@@ -55,8 +56,8 @@ class ZenohTransport(WireTransport):
     def _open_writer(self, name: str, topic: Topic[Any]) -> "_Writer":
         return _Writer(self._member, name, topic)
 
-    def _open_reader(self, name: str, topic: Topic[Any], take: Take) -> Callable[[], None]:
-        return _Reader(self._member, name, topic, take).close
+    def _open_reader(self, name: str, topic: Topic[Any], profile: Profile, take: Take) -> Callable[[], None]:
+        return _Reader(self._member, name, topic, profile, take).close
 
     def _open_service(self, name: str, kind: str, respond: Callable[[bytes], bytes]) -> Callable[[], None]:
         key = self._member.key(name, kind)
@@ -154,10 +155,10 @@ class _Reader:
     Zenoh puts them into a ring that keeps the newest, so that no queue grows and no other subscriber is delayed.
     """
 
-    def __init__(self, member: Member, name: str, topic: Topic[Any], take: Take) -> None:
+    def __init__(self, member: Member, name: str, topic: Topic[Any], profile: Profile, take: Take) -> None:
         self._take = take
         self._is_closed = False
-        profile, kind = requested(topic), type_name(topic.type)
+        kind = type_name(topic.type)
         self._subscriber = _subscriber(member.session, member.key(name, kind), profile)
         self._token, _ = member.introduce("subscriber", name, kind, profile)
         threading.Thread(target=self._run, name=f"zenoh {topic.name}", daemon=True).start()

@@ -245,6 +245,7 @@ const WORDS = {
   "This computer is too slow or busy: pictures may have waited": "Dieser Computer ist zu langsam oder ausgelastet: Bilder haben vielleicht gewartet",
   "This computer is too slow or busy: pictures arrive # s late": "Dieser Computer ist zu langsam oder ausgelastet: Bilder kommen # s zu spät",
   "This computer is too slow or busy: a picture was # s old when its sign was known": "Dieser Computer ist zu langsam oder ausgelastet: ein Bild war # s alt, als sein Zeichen feststand",
+  "old frames do not count while a recording is played next to another publisher of the same topic": "alte Bilder zählen nicht, solange neben einem anderen Sender desselben Topics eine Aufzeichnung abgespielt wird",
   "a clock was set back by # s: frames are timed again in a moment": "eine Uhr wurde um # s zurückgestellt: Bilder zählen gleich wieder",
   "a clock was set ahead by # s: frames are timed again in a moment": "eine Uhr wurde um # s vorgestellt: Bilder zählen gleich wieder",
   "frames are stamped # s ahead of our clock: are the clocks of the machines synchronised?": "Zeitstempel der Bilder sind unserer Uhr # s voraus: sind die Uhren der Rechner synchron?",
