@@ -149,8 +149,10 @@ def _run(words: list[str]) -> int:
         given.arguments["parameters"] = parameters
     elif parameters:
         return fail(f"{words[0]} takes no parameters of the configuration; see handsteer {words[0]} --help")
-    # First: it loads the parameters of plug-ins, whose modules may import any other, which must not be half loaded.
-    for module in ("handsteer.config", *_LOADS.get(verb, ())):
+    if not verb.__module__.startswith("cyclopts"):  # help and version, which load little
+        # First: it loads the parameters of plug-ins, whose modules may import any other, which must not be half loaded.
+        importlib.import_module("handsteer.config")
+    for module in _LOADS.get(verb, ()):
         importlib.import_module(module)
     gc.enable()
     # The verb is loaded; from here on, an interrupt must clean up what it started.

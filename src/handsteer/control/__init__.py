@@ -234,7 +234,7 @@ def _is_faster(config: ControlConfig, than: ControlConfig, *, by_signs: bool) ->
     def grows(name: str) -> bool:
         return bool(getattr(config, name) > getattr(than, name))
 
-    def loosens(name: str) -> bool:  # zero is no limit
+    def loosens(name: str) -> bool:  # zero is unlimited
         return bool((getattr(config, name) or math.inf) > (getattr(than, name) or math.inf))
 
     return (

@@ -321,7 +321,8 @@ class HandSignControlNode(Node):
             self._watchdog.delay_until(self.clock.now() + CALM_S)
 
     def _look_for_changes(self, now_s: float) -> None:
-        self._audit.look(self._safety, self._mux.source, self._reason, now_s)
+        source = "none" if self._safety.is_stopped else self._mux.source
+        self._audit.look(self._safety, source, self._reason, now_s)
 
     def _look_after_the_robot(self, elapsed_s: float) -> None:
         changed = self._selection.follow() if self._selection else self._cmd_vel.follow()

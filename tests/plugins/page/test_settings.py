@@ -232,14 +232,16 @@ def test_a_graph_drives_on_by_what_is_set(tmp_path: Path) -> None:
 
         show("Forward")
         assert show("Forward") == pytest.approx(0.02)
-        settings.set(FIELDS["control.linear_step"], "0.2")
         settings.set(FIELDS["control.actions"], "Peace: forward")
         assert show("Go") == pytest.approx(0.02)
-        assert show("Peace") == pytest.approx(0.22)
-        settings.set(FIELDS["control.max_linear"], "0.1")
-        assert show("Go") == pytest.approx(0.1)
+        assert show("Peace") == pytest.approx(0.03)
+        settings.set(FIELDS["control.max_linear"], "0.02")
+        assert show("Go") == pytest.approx(0.02)
+        settings.set(FIELDS["control.linear_step"], "0.2")
+        assert show("Forward") == 0.0  # what would make it faster stops it
+        assert show("Stop") == 0.0
         settings.set(FIELDS["control.max_linear"], "1")
-        assert show("Go") == pytest.approx(0.1)  # another limit alone makes nothing faster
+        assert show("Peace") == pytest.approx(0.2)
 
 
 def test_every_section_has_its_fields() -> None:

@@ -6,11 +6,11 @@ import urllib.request
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Route
+from playwright.sync_api import Locator, Page, Route
 
 from handsteer.messages import STOP
-from tests.plugins.page.test_sticks_in_browser import PLUG_IN
-from tests.plugins.page.visits import NEEDS_A_BROWSER, Visit, visiting
+from tests.plugins.page.test_sticks_in_browser import PLUG_IN, phone
+from tests.plugins.page.visits import NEEDS_A_BROWSER, Visit, each_when_there_is_time, visiting
 
 pytestmark = NEEDS_A_BROWSER
 OPENERS = 3
@@ -78,3 +78,116 @@ def test_stop_shows_how_far_it_is_and_is_repeated_until_confirmed(
             assert heard.wait(60)
             shows(visit, "")
         assert visit.page.locator(".banner .stop").inner_text().strip() in {"Stop", "Stopp"}
+
+
+def middle(element: Locator) -> tuple[float, float]:
+    box = element.bounding_box()
+    assert box is not None
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+class Fingers:
+    """Fingers on a screen, by number, each at a place or lifted."""
+
+    def __init__(self, page: Page) -> None:
+        self._session = page.context.new_cdp_session(page)
+        self._at: dict[int, tuple[float, float]] = {}
+
+    def put(self, number: int, x: float, y: float) -> None:
+        self._at[number] = (x, y)
+        self._send("touchStart")
+
+    def move(self, number: int, x: float, y: float) -> None:
+        self._at[number] = (x, y)
+        self._send("touchMove")
+
+    def lift(self, number: int) -> None:
+        del self._at[number]
+        self._send("touchEnd")
+
+    def _send(self, kind: str) -> None:
+        points = [{"x": x, "y": y, "id": number} for number, (x, y) in self._at.items()]
+        self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+
+def is_stopped(visit: Visit) -> bool:
+    return visit.graph.control._safety.is_stopped
+
+
+@pytest.fixture
+def visit() -> Iterator[Visit]:
+    with visiting("Stop:600", camera={"fps": 5}) as visit:
+        yield visit
+
+
+@pytest.mark.parametrize("press", ["mouse kept down", *each_when_there_is_time("mouse lifted beside", "enter")])
+def test_stop_counts_when_it_is_pressed(visit: Visit, press: str) -> None:
+    page, stop = visit.page, visit.page.locator(".banner .stop")
+    if press == "enter":
+        stop.focus()
+        page.keyboard.press("Enter")
+    else:
+        x, y = middle(stop)
+        page.mouse.move(x, y)
+        page.mouse.down()
+        if press == "mouse lifted beside":
+            page.mouse.move(x, y + 150)
+            page.mouse.up()
+    visit.wait_until(lambda: is_stopped(visit))
+    assert page.evaluate("press") == 1
+
+
+def test_a_click_on_stop_counts_once(visit: Visit) -> None:
+    visit.page.locator(".banner .stop").click()
+    visit.wait_until(lambda: is_stopped(visit))
+    assert visit.page.evaluate("press") == 1
+    visit.page.locator(".banner .stop").click()
+    assert visit.page.evaluate("press") == 2
+
+
+@pytest.mark.parametrize("touch", ["second finger", *each_when_there_is_time("finger that stays", "finger that slips")])
+def test_stop_is_pressed_by_any_finger(visit: Visit, touch: str) -> None:
+    with phone(visit) as page:
+        fingers = Fingers(page)
+        page.locator(".pad").scroll_into_view_if_needed()
+        if touch == "second finger":
+            x, y = middle(page.locator(".pad"))
+            fingers.put(1, x, y - 40)
+            page.locator(".pad.held").wait_for()
+        x, y = middle(page.locator(".banner .stop"))
+        fingers.put(2, x, y)
+        if touch == "finger that slips":
+            fingers.move(2, x - 30, y + 30)
+        visit.wait_until(lambda: is_stopped(visit))
+        assert page.locator(".pad.held").count() == 0
+    assert visit.troubles == []
+
+
+def test_a_pad_that_is_held_while_the_phone_is_turned_is_let_go(visit: Visit) -> None:
+    with phone(visit) as page:
+        fingers = Fingers(page)
+        page.locator(".pad").scroll_into_view_if_needed()
+        x, y = middle(page.locator(".pad"))
+        fingers.put(1, x, y - 40)
+        page.locator(".pad.held").wait_for()
+        page.set_viewport_size({"width": 740, "height": 390})
+        page.wait_for_function("!document.querySelector('.pad.held')")
+        fingers.move(1, x, y - 38)
+        page.wait_for_timeout(300)
+        assert page.locator(".pad.held").count() == 0
+
+
+def test_a_stop_that_the_server_refuses_is_not_repeated_without_end(visit: Visit) -> None:
+    """As where the browser has lost its session: then only the websocket is left, by which it counts."""
+    answers: list[int] = []
+    page = visit.page
+
+    def refuse(route: Route) -> None:
+        answers.append(403)
+        route.fulfill(status=403)
+
+    page.route("**/stop?*", refuse)
+    page.keyboard.press("Space")
+    visit.wait_until(lambda: is_stopped(visit) and bool(answers))
+    page.wait_for_timeout(1000)
+    assert len(answers) <= 4

@@ -39,6 +39,8 @@ _CHANGED = "changed"
 _ALONE: Final = {"alone": True, "shared": False}
 """Sent by the browser when its pictures are for itself only, and when they no longer are."""
 
+_LOOK_S = 0.5
+
 _ANOTHER_CAMERA = 1000
 _NOT_A_FRAME, _NOT_THE_DRIVER, _NO_CAMERA_HERE, _BUSY = 4400, 4403, 4404, 4409
 
@@ -79,7 +81,7 @@ class FrameSocket:
                 self._in_use.release()
 
     async def _receive(self, socket: WebSocket, graph: RemoteGraph, viewer: str) -> None:
-        loop, changed = asyncio.get_running_loop(), True
+        loop, changed, messages = asyncio.get_running_loop(), True, _Messages(socket)
         try:
             while self._drives(viewer):
                 if changed:
@@ -88,12 +90,12 @@ class FrameSocket:
                     await socket.close(_ANOTHER_CAMERA)
                     return
                 began_s = loop.time()
-                message = await socket.receive()
+                message = await messages.next()
                 words = message.get("text")
                 changed = words == _CHANGED
                 if words in _ALONE:
                     self._privacy.set_alone(on=_ALONE[words])
-                elif not changed:
+                elif message and not changed:
                     graph.offer_frame(_frame_of(message))
                     await asyncio.sleep(max(0.0, began_s + 1 / FRAMES_PER_S - loop.time()))
                     await socket.send_text(NEXT)
@@ -104,6 +106,8 @@ class FrameSocket:
             await socket.close(_NOT_A_FRAME, str(error))
         except WebSocketDisconnect:
             pass
+        finally:
+            messages.close()
 
     @staticmethod
     async def _begin(graph: RemoteGraph, *, is_far: bool) -> None:
@@ -114,6 +118,31 @@ class FrameSocket:
         if was_demo and graph.state.world is not None:
             with suppress(HandsteerError):  # it then begins where it is
                 await asyncio.wrap_future(graph.reset())
+
+
+class _Messages:
+    """What a browser sends, waited for no longer than a look at the driver may take.
+
+    Else a browser that gives no pictures, as on a phone that sleeps, would keep a new driver from giving theirs.
+    """
+
+    def __init__(self, socket: WebSocket) -> None:
+        self._socket = socket
+        self._next: asyncio.Future[Message] | None = None
+
+    async def next(self) -> Message:
+        """Return the next message; an empty one if there is none within :data:`_LOOK_S`."""
+        self._next = self._next or asyncio.ensure_future(self._socket.receive())
+        done, _ = await asyncio.wait([self._next], timeout=_LOOK_S)
+        if not done:
+            return {}
+        message, self._next = self._next.result(), None
+        return message
+
+    def close(self) -> None:
+        """Wait no longer."""
+        if self._next is not None:
+            self._next.cancel()
 
 
 def _frame_of(message: Message) -> bytes:

@@ -142,7 +142,8 @@ class Cues:
             self._switch.client.run_javascript(f"window.cue?.({json.dumps(news[0])}, {json.dumps(news[1])})")
 
 
-_PRESS = "() => emit({ press: window.pressStop?.() ?? 0 })"
+_PRESS_WITHOUT_SCRIPT = "() => window.pressStop ? undefined : emit({ press: 0 })"
+"""``static/page.js`` reports a press; without it, as where it was not loaded, a click does."""
 
 
 class Banner:
@@ -167,7 +168,7 @@ class Banner:
                 self._reset = button("Reset", reset, "Reset: let the robot be driven again").classes("hidden")
                 stop = button("Stop", label="Stop the robot (space key)").classes("stop")
                 stop.props('aria-keyshortcuts="Space"')
-                stop.on("click", lambda event: halt(event.args), js_handler=_PRESS)
+                stop.on("click", lambda event: halt(event.args), js_handler=_PRESS_WITHOUT_SCRIPT)
                 with stop:
                     text("pressed sent", "Sent")
                     text("pressed confirmed", "Stopped")

@@ -5,6 +5,7 @@ reliable and subscribers request best effort, as in REP 2003 for sensor data: th
 late messages are of no use to us. ``/clock`` is best effort.
 """
 
+import itertools
 import logging
 import math
 import re
@@ -275,7 +276,10 @@ Take = Callable[[bytes, bytes, float | None], None]
 
 
 class Once:
-    """Passes on what two readers of one topic receive, each message once.
+    """Passes on what two readers of one topic receive, each message once, and the newest of a sender last.
+
+    One reader may overtake the other, which has to wait for what was lost. So after an older message, a newer one that
+    was passed on already is passed on again.
 
     Args:
         take: As :meth:`Intake.take`.
@@ -287,11 +291,20 @@ class Once:
 
     def take(self, raw: bytes, sender: bytes, sent_s: float | None) -> None:
         """Process one message; without a time of sending it may come twice."""
-        if sent_s is not None:
-            if (raw, sent_s) in self._taken:
-                return
-            self._taken.append((raw, sent_s))
+        if sent_s is not None and self._is_taken((raw, sent_s)):
+            return
         self._take(raw, sender, sent_s)
+
+    def _is_taken(self, message: tuple[bytes, float]) -> bool:
+        """Record a message; return whether it was passed on, and no older one after it."""
+        taken = self._taken
+        if message in taken:
+            at = taken.index(message)
+            if all(sent_s >= message[1] for _, sent_s in itertools.islice(taken, at, None)):
+                return True
+            del taken[at]
+        taken.append(message)
+        return False
 
 
 def are_players(nodes: Sequence[str]) -> bool:

@@ -3,7 +3,7 @@
 // Stop goes two ways: by the websocket, which the caller uses, and by requests that the server answers even while it
 // builds pages. These are repeated until one is answered. data-stop on the root shows how far it is.
 const STOP_REPEAT_MS = 200, PATIENCE_MS = 4000, SHOWN_MS = 2000, MOST_AT_ONCE = 4;
-let press = 0, confirmed = 0, shownUntil = 0;
+let press = 0, confirmed = 0, shownUntil = 0, refused = 0;
 function pressStop() {
   const number = ++press;
   document.documentElement.dataset.stop = "sent";
@@ -12,7 +12,7 @@ function pressStop() {
 }
 async function repeatStop(number) {
   let open = 0;
-  while (confirmed < number && number === press) {
+  while (confirmed < number && refused < number && number === press) {
     if (open < MOST_AT_ONCE) {
       open++;
       sendStop(number).finally(() => open--);
@@ -24,6 +24,7 @@ async function sendStop(number) {
   try {
     const signal = AbortSignal.timeout(PATIENCE_MS);
     const answer = await fetch(`/stop?page=${window.clientId}&press=${number}`, { method: "POST", signal });
+    if (answer.status === 403) refused = number; // this browser's session is gone: only the websocket is left
     if (!answer.ok || confirmed >= number) return;
   } catch {
     return; // repeated
@@ -37,6 +38,18 @@ async function sendStop(number) {
   }, SHOWN_MS + 50);
 }
 window.pressStop = pressStop;
+
+// The button counts when it is pressed: a finger that stays or slips, or a second one, gives no click.
+let pointed = false;
+document.addEventListener("pointerdown", (event) => {
+  pointed = event.target.closest?.(".banner .stop") != null;
+  if (pointed) emitEvent("space", { press: pressStop() });
+}, true);
+document.addEventListener("click", (event) => {
+  if (!event.target.closest?.(".banner .stop")) return;
+  if (event.detail === 0 || !pointed) emitEvent("space", { press: pressStop() }); // Enter, or what assists
+  pointed = false;
+}, true);
 
 // Anywhere except where a space can be typed; a focused button would otherwise take the space key as a click.
 const TAKES_SPACE = "input:not([type=number], [inputmode=decimal], [type=color], [readonly]), textarea:not([readonly]), [contenteditable]";

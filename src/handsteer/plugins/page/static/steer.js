@@ -1,6 +1,7 @@
 // What needs the browser: how long the pad or a key is held, and whether the page is in front.
 
 const REPEAT_MS = 100; // the server stops the robot after 300 ms without a message
+const MOST_MOVED_PX = 8; // more than the page's parts move while one drives
 const KEY_REPEATS_MS = 500; // systems repeat a key every 30 ms or so, once they have begun to
 const KEYS = {
   ArrowUp: [0, 1], KeyW: [0, 1], ArrowDown: [0, -1], KeyS: [0, -1],
@@ -80,6 +81,7 @@ function followPointer(event, pad) {
   const box = pad.getBoundingClientRect();
   const reach = (box.width - pad.querySelector(".knob").clientWidth) / 2;
   hold(pad, (event.clientX - box.left - box.width / 2) / reach, -(event.clientY - box.top - box.height / 2) / reach);
+  held.box = box;
 }
 
 document.addEventListener("pointerdown", (event) => {
@@ -136,6 +138,12 @@ function followKeys(pad) {
 }
 
 document.addEventListener("keydown", (event) => event.code === "Space" && letGo(), true);
+document.addEventListener("pointerdown", (event) => event.target.closest?.(".banner .stop") && letGo(), true);
+// As when a phone is turned: at another place of the pad, the finger would command something else.
+window.addEventListener("resize", () => {
+  const before = held?.box, now = before && held.pad.getBoundingClientRect();
+  if (now && Math.hypot(now.left - before.left, now.top - before.top) > MOST_MOVED_PX) releasePad();
+});
 document.addEventListener("focusout", (event) => event.target.closest?.(".pad") && releasePad());
 document.addEventListener("visibilitychange", () => document.hidden && letGo());
 // While a context menu is open or an element is dragged, browsers send no keyup and no pointerup.
