@@ -248,9 +248,10 @@ class ClockWatch:
         gap_s, self._seen_s = now_s - self._seen_s, now_s
         if self._watched is not None:
             first_age_s, since_s = self._watched
-            # A single late message, not the clock; or too few to tell.
-            if abs(age_s - first_age_s) > STALE_S or gap_s > 2 * RESYNC_S:
+            if abs(age_s - first_age_s) > STALE_S:  # a single late message, not the clock
                 self._watched = None
+            elif gap_s > 2 * RESYNC_S:  # too few to tell: observe the next
+                self._watched = (age_s, now_s)
             elif now_s - since_s >= RESYNC_S:
                 self._correction_s += self.set_by_s
                 log.warning("%s: the stamps of its messages are corrected by that", clock_change(self.set_by_s))

@@ -299,8 +299,6 @@ SLOW = ControlConfig(
         {"max_angular": 1.0},
         {"linear_step": 0.5},
         {"angular_step": 0.5},
-        {"linear_acceleration": 5.0},
-        {"angular_acceleration": 5.0},
         {"max_sign_rate": 90.0},
         {"ramp": "per_second"},
         {"max_linear_acceleration": 0.0},
@@ -333,6 +331,28 @@ def test_what_makes_nothing_faster_leaves_a_sign_driving(change: dict[str, Any])
     velocity = control.step(DT, sign=FORWARD)
     assert velocity is not None
     assert velocity.linear_mps > 0
+
+
+@pytest.mark.parametrize("change", [{"linear_acceleration": 5.0}, {"angular_acceleration": 5.0}], ids=str)
+def test_what_a_sign_drives_by_time_is_made_faster_by_no_change(change: dict[str, Any]) -> None:
+    by_time = SLOW.model_copy(update={"ramp": "per_second"})
+    control = Control(by_time, arming=False)
+    for _ in range(20):
+        control.step(DT, sign=FORWARD)
+    assert control.reconfigure(by_time.model_copy(update=change)) == ZERO
+
+
+def test_what_does_not_concern_what_drives_leaves_it_driving() -> None:
+    by_time = SLOW.model_copy(update={"ramp": "per_second"})
+    control = Control(by_time, arming=False)
+    for _ in range(20):
+        control.step(DT, sign=FORWARD)
+    assert control.reconfigure(by_time.model_copy(update={"linear_step": 0.5, "point_turn": 9.0})) is None
+    points = ControlConfig(rule="point")
+    control = Control(points, arming=False)
+    for forward in (0.0, 0.2, 0.2):
+        control.step(DT, steering=Velocity(forward, 0.0))
+    assert control.reconfigure(points.model_copy(update={"point_turn": 9.0, "linear_step": 0.5})) is None
 
 
 @pytest.mark.parametrize("change", [{"max_linear_acceleration": 0.0}, {"max_angular_jerk": 0.0}], ids=str)

@@ -199,6 +199,14 @@ def test_after_20_s_without_any_change_it_has_to_be_shown_anew() -> None:
     assert shown(control, FORWARD, AHEAD).linear_mps > 0
 
 
+@pytest.mark.parametrize("change", [{"max_linear": 0.2}, {"max_linear": 9.0}, {"point_turn": 9.0}, {"point_time": 0.1}])
+def test_a_change_that_would_make_it_turn_or_drive_faster_stops(control: Control, change: dict[str, Any]) -> None:
+    """A lower limit of speed, too: the turn is in proportion to the share of it that has been reached."""
+    shown(control, FORWARD, AHEAD, 0.3)
+    assert control.reconfigure(CONFIG.model_copy(update=change)) == ZERO
+    assert shown(control, FORWARD, AHEAD) == ZERO
+
+
 @pytest.mark.parametrize("change", [{"rule": "course"}, {"mode": "joystick"}])
 def test_another_rule_stops_and_wants_neutral(control: Control, change: dict[str, Any]) -> None:
     shown(control, FORWARD, AHEAD, 1.0)

@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from handsteer.clock import SteppedClock
-from handsteer.config import ControlConfig
+from handsteer.config import Config, ControlConfig
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CMD_VEL,
@@ -258,3 +258,36 @@ def test_its_stop_is_repeated_until_it_is_reset(bench: Bench) -> None:
     for _ in range(10):
         bench.step()
     assert said == [*[True] * 11, False]
+
+
+@pytest.mark.parametrize("topic", [ROBOT.name, STEERING_CMD_VEL.name])
+@pytest.mark.parametrize(
+    ("change", "goes_on"),
+    [
+        ({"max_linear": 1.0}, False),
+        ({"max_linear_acceleration": 0.0}, False),
+        ({"max_linear": 0.2}, True),
+        ({"linear_step": 0.5}, True),
+    ],
+    ids=str,
+)
+def test_a_change_that_would_make_it_faster_ends_what_is_held(
+    topic: str, change: dict[str, float], *, goes_on: bool
+) -> None:
+    limits = ControlConfig(max_linear=0.3, max_linear_acceleration=0.1)
+    bench = Bench(limits)
+    bench.node.send_to(topic)
+    said = bench.robot if topic == ROBOT.name else bench.mux
+    for linear_mps in (0.0, 1.0, 1.0):
+        bench.node.steer(linear_mps, 0.0)
+        bench.step()
+    assert said[-1][0] > 0
+    bench.node.reconfigure(Config(control=limits.model_copy(update=change)))
+    bench.step(0.0)
+    bench.node.steer(1.0, 0.0)
+    assert (said[-1][0] > 0) is goes_on
+    bench.node.steer(0.0, 0.0)
+    bench.node.steer(1.0, 0.0)
+    bench.step()
+    bench.node.steer(1.0, 0.0)
+    assert said[-1][0] > 0

@@ -146,6 +146,14 @@ def test_a_few_old_frames_with_a_long_pause_between_are_no_clock_that_was_set(ca
     assert "a clock was set back by 3600.0 s: the stamps of its messages are corrected by that" in caplog.text
 
 
+def test_a_pause_while_a_clock_that_was_set_is_measured_begins_that_again() -> None:
+    age = FrameAge(LIMIT_S)
+    assert all(age.why_refused(number * PERIOD_S, number * PERIOD_S) is None for number in range(30))
+    for began_s, frames in ((1.0, 10), (6.0, 60)):
+        told = [age.why_refused(began_s + n * PERIOD_S, began_s + n * PERIOD_S - 5.0) for n in range(frames)]
+    assert told[-1] is None
+
+
 def test_a_queue_that_stood_still_is_no_clock_that_was_set() -> None:
     age = FrameAge(LIMIT_S)
     assert all(age.why_refused(number * PERIOD_S, number * PERIOD_S) is None for number in range(30))

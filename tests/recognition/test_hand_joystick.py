@@ -117,6 +117,17 @@ def _focal_px() -> float:
     return float(np.hypot(*SIZE) / (2 * np.tan(np.radians(35.0))))
 
 
+@pytest.mark.parametrize("change", [{"full_deflection": 0.3}, {"dead_zone": 0.0}, {"expo": 0.3}], ids=str)
+def test_a_change_of_its_parameters_lets_go(person: Person, change: dict[str, float]) -> None:
+    """What is held would be another deflection at once."""
+    person.grabs()
+    person.joystick.reconfigure(LINEAR.model_copy())
+    assert person.joystick.stick == Stick(held=True)
+    person.joystick.reconfigure(LINEAR.model_copy(update=change))
+    assert person.closes() == RELEASED
+    person.grabs()
+
+
 def test_an_open_hand_releases_it_at_once(person: Person) -> None:
     person.grabs()
     person.drags(40, 0)

@@ -36,6 +36,7 @@ def main(arguments: list[str] | None = None) -> None:
     except Exception:
         # A library that is being imported may convert the interrupt to an error of its own.
         if not signals.were_raised():
+            _has_ended(interrupted, is_process=is_process)
             raise
         code = interrupted
         _has_ended(code, is_process=is_process)

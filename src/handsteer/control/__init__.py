@@ -174,7 +174,7 @@ class Control:
         if self._way_to_drive(config) != self._way_to_drive(self._config):
             self.safety.disarm("its rule has changed")
             stopped = self.halt()
-        elif self._is_driven and _is_faster(config, self._config, by_signs=self.mux.source == "signs"):
+        elif self._is_driven and is_faster(self.mux.source, config, self._config):
             self.safety.disarm("its limits have changed")
             stopped = self.halt()
         self._config = config
@@ -225,11 +225,14 @@ class Control:
 
 _LIMITS = ("max_linear", "max_angular")
 _RAMPS = ("max_linear_acceleration", "max_angular_acceleration", "max_linear_jerk", "max_angular_jerk")
-_BY_SIGNS = ("linear_step", "angular_step", "linear_acceleration", "angular_acceleration", "max_sign_rate")
+_STEPS = {
+    "per_message": ("linear_step", "angular_step", "max_sign_rate"),
+    "per_second": ("linear_acceleration", "angular_acceleration"),
+}
 
 
-def _is_faster(config: ControlConfig, than: ControlConfig, *, by_signs: bool) -> bool:
-    """Return whether what drives would be faster, or become so sooner, with ``config``."""
+def is_faster(source: Source, config: ControlConfig, than: ControlConfig) -> bool:
+    """Return whether what drives by ``source`` would be faster, or become so sooner, with ``config``."""
 
     def grows(name: str) -> bool:
         return bool(getattr(config, name) > getattr(than, name))
@@ -237,12 +240,14 @@ def _is_faster(config: ControlConfig, than: ControlConfig, *, by_signs: bool) ->
     def loosens(name: str) -> bool:  # zero is unlimited
         return bool((getattr(config, name) or math.inf) > (getattr(than, name) or math.inf))
 
-    return (
-        any(map(grows, _LIMITS))
-        or any(map(loosens, _RAMPS))
-        or (by_signs and (config.ramp != than.ramp or any(map(grows, _BY_SIGNS))))
-        or (config.points and (grows("point_turn") or config.point_time < than.point_time))
-    )
+    limits = any(map(grows, _LIMITS)) or any(map(loosens, _RAMPS))
+    if source == "signs":
+        return limits or config.ramp != than.ramp or any(map(grows, _STEPS[config.ramp]))
+    if source == "joystick" and config.points:
+        # The turn is in proportion to the share of the highest speed that has been reached.
+        is_other = config.max_linear != than.max_linear or config.point_time < than.point_time
+        return limits or is_other or grows("point_turn")
+    return limits
 
 
 class TwistMux:

@@ -7,6 +7,7 @@ from typing import Any
 
 from handsteer.clock import Clock
 from handsteer.config import Config, ControlConfig
+from handsteer.control import is_faster
 from handsteer.control.safety import Ramp, Safety
 from handsteer.errors import TransportError
 from handsteer.messages import CMD_VEL, STEERING_CMD_VEL, STOP, Bool, Topic, Twist
@@ -118,10 +119,13 @@ class SteeringNode(Node):
             self._target = target
 
     def on_reconfigure(self, config: Config) -> None:
-        """Apply the limits of ``control``."""
-        self._config = config.control
-        self._safety.reconfigure(config.control)
-        self._ramp.reconfigure(config.control)
+        """Apply the limits of ``control``; what would make faster what steers stops it until it is released."""
+        with self._lock:
+            if self._wanted is not None and is_faster("steering", config.control, self._config):
+                self.lose()
+            self._config = config.control
+            self._safety.reconfigure(config.control)
+            self._ramp.reconfigure(config.control)
 
     def steer(self, linear_mps: float, angular_radps: float) -> None:
         """Drive at this velocity from now on: m/s forward, rad/s to the left."""

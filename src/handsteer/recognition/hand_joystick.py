@@ -119,7 +119,9 @@ class HandJoystick:
         self._closing: deque[_Seen] = deque(maxlen=30)
 
     def reconfigure(self, config: JoystickConfig) -> None:
-        """Change the parameters; a held hand stays held."""
+        """Change the parameters; if they differ, a hand that is held is released, which would be faster by some."""
+        if config != self._config:
+            self.reset()
         self._config = config
 
     def step(self, recognition: Recognition, dt_s: float) -> Stick:

@@ -59,7 +59,9 @@ class Pointing:
         self._sign, self._share, self._unseen_s = "", 0.0, 0.0
 
     def reconfigure(self, config: JoystickConfig) -> None:
-        """Change the parameters."""
+        """Change the parameters; if they differ, it is released."""
+        if config != self._config:
+            self.reset()
         self._config = config
 
     def step(self, recognition: Recognition, dt_s: float) -> Stick:

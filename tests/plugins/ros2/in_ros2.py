@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 import rclpy
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String as TheirString
 
 from handsteer.clock import SimulatedClock
@@ -133,6 +133,8 @@ def test_an_empty_list_has_no_type_and_is_taken(joined: Join, tmp_path: Path) ->
     file.write_text("/**: {ros__parameters: {robots: [], names: {of: []}, max_linear: 0.5}}\n")
     session = joined("--params-file", str(file))
     assert session.parameters == {"robots": [], "names": {"of": []}, "max_linear": 0.5}
+    session.serve(NodeParameters(Config(), "control", lambda _: None))
+    assert session._node.get_parameter("robots").value == []  # type: ignore[attr-defined]
 
 
 def test_a_profile_can_be_overridden_of_what_is_opened_after_the_parameters_are_served(joined: Join) -> None:
@@ -141,6 +143,33 @@ def test_a_profile_can_be_overridden_of_what_is_opened_after_the_parameters_are_
     publisher = session.transport.advertise("page", STOP)
     session.transport.subscribe("page", STOP, lambda _: None)
     assert publisher._writer._publisher.qos_profile.depth == 3  # type: ignore[attr-defined]
+    by_node = [each.qos_profile for each in session._node.subscriptions if each.topic_name == "/stop"]  # type: ignore[attr-defined]
+    assert sorted((each.reliability.name, each.depth) for each in by_node) == [("BEST_EFFORT", 10), ("RELIABLE", 4)]
+
+
+def test_who_is_not_connected_is_named_once_by_the_names_of_the_graph(
+    joined: Join, domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    context = rclpy.Context()
+    context.init(args=[], domain_id=domain)
+    node = rclpy.create_node("other", context=context)
+    qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    node.create_subscription(TheirString, "/swapped", lambda _: None, qos)
+    session = joined("-r", "gesture/hand_sign:=/swapped", "-r", "swapped:=/gesture/hand_sign")
+    logging.getLogger("handsteer").addHandler(caplog.handler)
+    session.transport.advertise("talker", HAND_SIGN)
+
+    def is_said() -> bool:
+        session.wait(0.2)
+        return "nothing passes" in caplog.text
+
+    assert eventually(is_said)
+    for _ in range(10):
+        session.wait(0.2)
+    (line,) = [line for line in caplog.text.splitlines() if "nothing passes" in line]
+    assert "/swapped: nothing passes between our publisher and the subscriber of /other: the publisher is vol" in line
+    node.destroy_node()
+    context.shutdown()
 
 
 @pytest.mark.parametrize("override", ["publisher.depth:=abc", "publisher.reliability:=abc", "publisher.depth:=1.5"])

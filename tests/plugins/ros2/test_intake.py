@@ -66,6 +66,15 @@ def test_a_message_of_two_readers_is_passed_on_once() -> None:
     assert passed == [1.0, 2.0, 3.0, None, None, 3.0]
 
 
+def test_of_two_readers_the_newest_message_is_passed_on_last() -> None:
+    """The reliable reader waits for what was lost, while the other one goes on."""
+    passed: list[bytes] = []
+    once = Once(lambda raw, _sender, _sent_s: passed.append(raw))
+    for raw, sent_s in ((b"stop", 2.0), (b"reset", 1.0), (b"stop", 2.0), (b"stop", 2.0)):
+        once.take(raw, b"", sent_s)
+    assert passed == [b"stop", b"reset", b"stop"]
+
+
 def test_a_message_that_cannot_be_read_is_left_out(caplog: pytest.LogCaptureFixture) -> None:
     heard: list[Received[Any]] = []
     intake = Intake(STEERING_CMD_VEL, "/steering/cmd_vel", RealClock(), heard.append)

@@ -297,7 +297,10 @@ def take_given(node: Node) -> dict[str, Any]:
     for name in found:
         node.undeclare_parameter(name)
     values: dict[str, Any] = {name: _plain(given) for name, given in found.items()}
-    return nested(values | {name: [] for name in getattr(node, "emptied", ())})
+    if isinstance(node, LateManagedNode):
+        values |= {name: [] for name in node.emptied}
+        node.emptied = frozenset()  # they can be declared now, with a type
+    return nested(values)
 
 
 class ParameterLink:

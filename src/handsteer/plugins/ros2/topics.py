@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, NamedTuple
 
 from rclpy.clock import Clock as RosClock
@@ -26,6 +27,8 @@ from handsteer.plugins.ros2.base_transport import IMAGES, Profile, Ros2Transport
 _LOOK_S = 0.25
 _PLAYED_KEPT = 200
 _COMPARE_S = 1.0
+_NAME_DUE_S = 4.0
+_UNKNOWN, _REPORTED = "_NODE_NAME_UNKNOWN_", -math.inf
 _opening = threading.local()
 
 log = logging.getLogger(__name__)
@@ -75,7 +78,7 @@ class RclpyTransport(Ros2Transport):
         self._is_open = True
         self._ends: dict[tuple[str, bool], _End] = {}
         self._compared_s = -math.inf
-        self._reported: set[tuple[int, ...]] = set()
+        self._found: dict[tuple[int, ...], float] = {}
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
         """Return the full names of the ROS 2 nodes that publish ``topic``; killed ones remain for a while."""
@@ -110,7 +113,8 @@ class RclpyTransport(Ros2Transport):
                 event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
                 qos_overriding_options=self._overriding(name),
             )
-        return _Writer(self._node, publisher, self._compare(_End(name, topic, publisher.qos_profile), publishes=True))
+        end = _End(name, self._unresolved(topic), topic, publisher.qos_profile)
+        return _Writer(self._node, publisher, self._compare(end, publishes=True))
 
     def _open_reader(self, name: str, topic: Topic[Any], profile: Profile, take: Take) -> Callable[[], None]:
         kind = self._class_of(name, topic)
@@ -121,32 +125,33 @@ class RclpyTransport(Ros2Transport):
             sent_ns = info.get("source_timestamp", 0)  # not provided by every middleware
             take(raw, b"", sent_ns / 1e9 if sent_ns > 0 else None)
 
+        entity = "best_effort" if topic.any_reliability and not profile.reliable else None
+
         def open_(on_message: Callable[[bytes, Mapping[str, int]], None], qos: QoSProfile) -> Any:
             with _open(name):
-                opened = self._node.create_subscription(
+                return self._node.create_subscription(
                     kind,
                     self._unresolved(topic),
                     on_message,
                     qos,
                     event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-                    qos_overriding_options=self._overriding(name),
+                    qos_overriding_options=self._overriding(name, entity),
                     raw=True,
                 )
-            # Of two, the second one takes what the first one does not.
-            ends.append(self._compare(_End(name, topic, opened.qos_profile), publishes=False))
-            return opened
 
-        ends: list[Callable[[], None]] = []
         qos = subscription_qos(topic, profile)
         if topic.type in IMAGES:
-            ends.append(_Images(self._node, self._unresolved(topic), qos, open_, on_message).close)
+            images = _Images(self._node, self._unresolved(topic), qos, open_, on_message)
+            live, end = images.live, images.close
         else:
-            subscription = open_(on_message, qos)
-            ends.append(lambda: self._node.destroy_subscription(subscription))
+            live = open_(on_message, qos)
+            end = partial(self._node.destroy_subscription, live)
+        # Of two, the second one takes what the first one does not.
+        forget = self._compare(_End(name, self._unresolved(topic), topic, live.qos_profile), publishes=False)
 
         def close() -> None:
-            for end in ends:
-                end()
+            forget()
+            end()
 
         return close
 
@@ -168,14 +173,20 @@ class RclpyTransport(Ros2Transport):
             return
         self._compared_s = now_s
         node = self._node
-        for (name, publishes), end in tuple(self._ends.items()):
-            others = (node.get_subscriptions_info_by_topic if publishes else node.get_publishers_info_by_topic)(name)
-            for theirs in others:
-                gid = tuple(theirs.endpoint_gid)
-                found = [] if gid in self._reported else _misfits(end, theirs, publishes=publishes)
-                if found:
-                    self._reported.add(gid)
+        for (_, publishes), end in tuple(self._ends.items()):
+            look = node.get_subscriptions_info_by_topic if publishes else node.get_publishers_info_by_topic
+            for theirs in look(end.asked):
+                found = _misfits(end, theirs, publishes=publishes)
+                if found and self._is_due(tuple(theirs.endpoint_gid), theirs.node_name, now_s):
                     log.warning("%s", _explained(end, theirs, found, publishes=publishes))
+
+    def _is_due(self, gid: tuple[int, ...], node: str, now_s: float) -> bool:
+        """Return whether an end is to be reported now: once, and when its node's name is known, or will not be."""
+        since_s = self._found.setdefault(gid, now_s)
+        if since_s == _REPORTED or (node == _UNKNOWN and now_s - since_s < _NAME_DUE_S):
+            return False
+        self._found[gid] = _REPORTED
+        return True
 
     def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
         found = self._node.get_subscriptions_info_by_topic(self._unresolved(topic))
@@ -188,10 +199,10 @@ class RclpyTransport(Ros2Transport):
             return name
         return topic.moved_with(self.topic_name(beneath))
 
-    def _overriding(self, name: str) -> QoSOverridingOptions | None:
-        """Apply ``qos_overrides`` to the topic of this full name, if any are given."""
+    def _overriding(self, name: str, entity: str | None = None) -> QoSOverridingOptions | None:
+        """Apply ``qos_overrides`` to the topic of this full name, if any are given; to a second end by its name."""
         given = self._node.get_parameters_by_prefix(f"qos_overrides.{name}")
-        return QoSOverridingOptions.with_default_policies() if given else None
+        return QoSOverridingOptions.with_default_policies(entity_id=entity) if given else None
 
     def _class_of(self, name: str, topic: Topic[Any]) -> Any | None:
         kind = type_name(topic.type)
@@ -217,6 +228,9 @@ class _Images:
         qos: For the images of a camera.
         open_: Opens a subscription with a callback and a profile.
         on_message: Gets each image once.
+
+    Attributes:
+        live: The subscription to the newest.
     """
 
     def __init__(
@@ -230,13 +244,13 @@ class _Images:
         self._node, self._name, self._open, self._on_message = node, name, open_, on_message
         self._played: Any = None
         self._qos_of_played: QoSProfile | None = None
-        self._live = open_(self._on_live, qos)
+        self.live = open_(self._on_live, qos)
         # By a clock of its own: /clock may stand still.
         self._timer = node.create_timer(_LOOK_S, self._look, clock=RosClock(clock_type=ClockType.STEADY_TIME))
 
     def close(self) -> None:
         self._node.destroy_timer(self._timer)
-        for subscription in filter(None, (self._live, self._played)):
+        for subscription in filter(None, (self.live, self._played)):
             self._node.destroy_subscription(subscription)
 
     def _on_live(self, raw: bytes, info: Mapping[str, int]) -> None:
@@ -294,9 +308,17 @@ def ros_class(name: str) -> Any | None:
 
 
 class _End(NamedTuple):
-    """Our publisher of a topic, or our subscription to it: its full name, the topic, and the profile in use."""
+    """Our publisher of a topic, or our subscription to it.
+
+    Attributes:
+        name: Full name of the topic, as in the graph.
+        asked: The same as rclpy is asked for it, which remaps it.
+        topic: The topic.
+        qos: The profile in use.
+    """
 
     name: str
+    asked: str
     topic: Topic[Any]
     qos: QoSProfile
 
