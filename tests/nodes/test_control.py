@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from handsteer.clock import SimulatedClock
 from handsteer.config import Config, ControlConfig, JoyConfig
 from handsteer.messages import (
+    AUDIT,
     CAMERA_CHANGED,
     CMD_VEL,
     DIAGNOSTICS,
@@ -847,6 +848,17 @@ def test_a_higher_limit_makes_what_is_held_no_faster(mode: str, limit: str) -> N
         hold(0.0)
     hold(1.0)
     assert max(bench.last()) == 1.0
+
+
+def test_while_a_stop_is_in_force_the_audit_has_nothing_that_is_followed() -> None:
+    bench = ControlBench()
+    audit = bench.record(AUDIT)
+    bench.show("Forward", "Forward")
+    for _ in range(20):
+        bench.stop.publish(Bool(data=True))
+        bench.show("Forward", "Forward", "Forward")
+    said = [each.msg for each in audit if "follows" in each.msg]
+    assert said == ["follows signs", "follows nothing"]
 
 
 def test_signs_do_not_drive_in_the_mode_of_the_joystick_nor_the_joystick_in_that_of_signs() -> None:
