@@ -206,7 +206,7 @@ def test_profiles_that_do_not_fit_are_said_in_words(fresh: Ros2Graph) -> None:
         "/image_raw: nothing passes between our publisher and the subscriber of /looker: "
         "the publisher is volatile, the subscriber wants transient local"
     )
-    eventually(lambda: line in camera.text, 10.0, what=line)
+    eventually(lambda: line in camera.text, 30.0, what=line)
     time.sleep(0.2)
     assert fresh.peer.ask("get", topic="/image_raw") == []
 
@@ -218,7 +218,7 @@ def test_a_robot_that_cannot_hear_its_commands_is_named(fresh: Ros2Graph) -> Non
         "/cmd_vel: nothing passes between our publisher and the subscriber of /looker: "
         "the publisher is volatile, the subscriber wants transient local"
     )
-    eventually(lambda: line in control.text, 10.0, what=line)
+    eventually(lambda: line in control.text, 30.0, what=line)
     assert control.text.count("nothing passes") == 1
 
 

@@ -234,6 +234,20 @@ def speed(graph: Graph) -> float:
     return graph.robot.state.linear_mps
 
 
+def press_until_it_drives(graph: Graph, command: Callable[[], None]) -> None:
+    """Press, release and press again, as a person does where a busy machine has held up what the program sent."""
+    tap(command)
+    for _ in range(10):
+        with repeated(command):
+            end_s = time.monotonic() + 3.0
+            while time.monotonic() < end_s:
+                if abs(speed(graph)) > 0.1:
+                    return
+                time.sleep(0.05)
+        time.sleep(2 * HOLD_TIMEOUT_S)
+    pytest.fail("pressed again and again in vain")
+
+
 def stands(graph: Graph) -> bool:
     return abs(speed(graph)) < 0.005
 
@@ -253,9 +267,7 @@ def test_who_may_drive_has_the_token(origin: str | None) -> None:
                 Viewer(stranger, headers=headers)
         with Viewer(address, headers=headers) as viewer:
             viewer.advertise()
-            tap(lambda: viewer.command(0.2))
-            with repeated(lambda: viewer.command(0.2)):
-                eventually(lambda: speed(graph) > 0.1)
+            press_until_it_drives(graph, lambda: viewer.command(0.2))
 
 
 @pytest.mark.slow
@@ -269,15 +281,12 @@ def test_a_program_drives_and_when_it_is_silent_or_gone_the_robot_stops(encoding
             assert viewer.info["capabilities"] == ["clientPublish"]
             assert encoding in viewer.info["supportedEncodings"]
             viewer.advertise(encoding)
-            tap(lambda: viewer.publish(content))
-            with repeated(lambda: viewer.publish(content)):
-                eventually(lambda: speed(graph) > 0.1)
+            press_until_it_drives(graph, lambda: viewer.publish(content))
             eventually(lambda: stands(graph), what="the end of a silent program's commands")
             other.advertise()
             other.command(0.2)
             assert "another one drives the robot" in other.said()["message"]
-            with repeated(lambda: viewer.publish(content)):
-                eventually(lambda: speed(graph) > 0.1)
+            press_until_it_drives(graph, lambda: viewer.publish(content))
         eventually(lambda: stands(graph))
         eventually(lambda: seat.driver is None)
 
@@ -286,18 +295,14 @@ def test_a_program_drives_and_when_it_is_silent_or_gone_the_robot_stops(encoding
             return seat.driver is not None
 
         eventually(has_the_seat)
-        tap(lambda: other.command(-0.2))
-        with repeated(lambda: other.command(-0.2)):
-            eventually(lambda: speed(graph) < -0.1, what="the second program, once the first has gone")
+        press_until_it_drives(graph, lambda: other.command(-0.2))  # the second program, once the first has gone
 
 
 @pytest.mark.slow
 def test_what_a_network_held_back_moves_nothing() -> None:
     with standing() as graph, served(graph) as address, Viewer(address) as viewer:
         viewer.advertise()
-        tap(lambda: viewer.command(0.2))
-        with repeated(lambda: viewer.command(0.2)):
-            eventually(lambda: speed(graph) > 0.1)
+        press_until_it_drives(graph, lambda: viewer.command(0.2))
         eventually(lambda: stands(graph))
         before_m = graph.robot.path_length_m
         for _ in range(600):
@@ -306,19 +311,6 @@ def test_what_a_network_held_back_moves_nothing() -> None:
         assert "expected geometry_msgs/Twist" in viewer.said()["message"]
         time.sleep(HOLD_TIMEOUT_S)
         assert graph.robot.path_length_m - before_m < 0.02
-
-
-def press_until_it_drives(graph: Graph, viewer: Viewer) -> None:
-    """Release and press again, as a person does where a busy machine has held up what the program sent."""
-    for _ in range(10):
-        time.sleep(2 * HOLD_TIMEOUT_S)
-        with repeated(lambda: viewer.command(0.2)):
-            end_s = time.monotonic() + 3.0
-            while time.monotonic() < end_s:
-                if speed(graph) > 0.1:
-                    return
-                time.sleep(0.05)
-    pytest.fail("pressed again and again in vain")
 
 
 @pytest.mark.slow
@@ -330,8 +322,7 @@ def test_a_short_stall_of_a_network_is_no_release() -> None:
         relay = opened.enter_context(Relay(address.port or 0))
         viewer = opened.enter_context(Viewer(address._replace(netloc=f"127.0.0.1:{relay.port}").geturl()))
         viewer.advertise()
-        tap(lambda: viewer.command(0.2))
-        press_until_it_drives(graph, viewer)
+        press_until_it_drives(graph, lambda: viewer.command(0.2))
         relay.freeze()
         eventually(lambda: stands(graph))
         for _ in range(3):
@@ -342,7 +333,7 @@ def test_a_short_stall_of_a_network_is_no_release() -> None:
         with repeated(lambda: viewer.command(0.2)):
             time.sleep(1.5)
             assert graph.robot.path_length_m - before_m < 0.02
-        press_until_it_drives(graph, viewer)
+        press_until_it_drives(graph, lambda: viewer.command(0.2))
 
 
 @pytest.mark.parametrize(
@@ -426,9 +417,7 @@ def test_beside_a_page_without_viewers_a_program_takes_the_seat() -> None:
                     viewer.advertise()
                     tap(lambda: viewer.command(0.2))
                     eventually(lambda: "Foxglove 1 took the seat, which was free" in told)
-                    tap(lambda: viewer.command(0.2))
-                    with repeated(lambda: viewer.command(0.2)):
-                        eventually(lambda: speed(graph) > 0.1)
+                    press_until_it_drives(graph, lambda: viewer.command(0.2))
                 eventually(lambda: stands(graph))
                 eventually(lambda: "Foxglove 1 left the seat" in told)
         finally:
