@@ -83,6 +83,11 @@ def test_what_a_node_gives_is_taken_at_a_start(section: str) -> None:
     assert config.load(None, None, from_parameters(given, section, "/node")) == Config()
 
 
+def test_no_preset_is_that_of_the_kind_of_robot() -> None:
+    kind = {"robot": {"kind": "ros2"}}
+    assert config.load(None, kind, {"robot": {"preset": ""}}) == config.load(None, kind)
+
+
 def test_a_file_can_be_taken_away_again(tmp_path: Path) -> None:
     applied: list[Config] = []
     parameters = NodeParameters(Config(), "signs", applied.append)

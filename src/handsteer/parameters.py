@@ -92,8 +92,6 @@ def _warn_unknown(full_name: str, name: str, known: Mapping[str, str]) -> None:
 
 
 def _checked(section: str, name: str, value: Any, full_name: str) -> Any:
-    if _is_none(section_model(section), name, value):
-        return None
     try:
         validate(Config, {section: {name: value}})
     except ConfigError as error:
@@ -243,7 +241,7 @@ class NodeParameters:
         types, words = _VALUES[kind]
         if not isinstance(value, types) or (isinstance(value, bool) and kind != "bool"):
             raise ConfigError(f"{name}: {value!r} should be {words}")
-        table[key] = None if _is_none(place.model, place.field, value) else value
+        table[key] = value
 
     def _names_file(self, name: str) -> bool:
         place = self._place(name)
@@ -308,11 +306,6 @@ def describe(model: type[Section], name: str) -> Description:
     fixed = None if name in model.live else _AT_START
     bounds = (lowest, _bound(field, "le"))
     return Description(kind, field.description or "", *bounds, constraint, choices, fixed, is_path=of is Path)
-
-
-def _is_none(model: type[Section], name: str, value: Any) -> bool:
-    """Return whether ``value`` is how a parameter service, which has no None, gives that of an optional parameter."""
-    return value == "" and NoneType in get_args(model.model_fields[name].annotation)
 
 
 def _without_none(annotation: Any) -> Any:

@@ -30,7 +30,7 @@ from handsteer.config.recognition import (
     SignsConfig,
     VirtualHandConfig,
 )
-from handsteer.config.section import Section, live
+from handsteer.config.section import OptionalPath, Section, live
 from handsteer.doors import PARAMETERS
 from handsteer.errors import ConfigError, PluginError, as_name, did_you_mean, quoted
 from handsteer.types import CmdVelType
@@ -108,10 +108,10 @@ class DashboardConfig(Section):
         "machines, which need the token in the printed address",
     )
     port: int = Field(8080, ge=0, le=65535, description="Port of the page; 0 picks a free one")
-    certificate: Path | None = Field(
+    certificate: OptionalPath = Field(
         None, description="PEM file with the certificate for https, without which browsers do not share a camera"
     )
-    private_key: Path | None = Field(None, description="PEM file with its key, if not in the certificate's file")
+    private_key: OptionalPath = Field(None, description="PEM file with its key, if not in the certificate's file")
     token: Literal["auto", "always"] = Field(
         "auto",
         description="When the page needs the token: auto if other machines can reach it, or always, for machines with "
@@ -295,7 +295,7 @@ def _fields_beside(section: type[Section] | None, place: tuple[str | int, ...]) 
 def _preset(values: dict[str, Any]) -> dict[str, Any]:
     """Return the preset of the robot that ``values`` name; it overrides only the defaults. Validation comes later."""
     robot = values["robot"] if isinstance(values.get("robot"), dict) else {}
-    name, kind = robot.get("preset"), robot.get("kind", "sim")
+    name, kind = robot.get("preset") or None, robot.get("kind", "sim")
     if name is None and kind != "sim":
         name = "generic"
     return PRESETS.get(name, {}) if isinstance(name, str) else {}

@@ -12,11 +12,11 @@ A preset overrides the defaults, and everything else overrides it. Sources, by r
 """
 
 import re
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import Field, field_validator
 
-from handsteer.config.section import Section, live
+from handsteer.config.section import EMPTY_IS_NONE, Section, live
 from handsteer.doors import ACTIONS, ASSISTS, ROBOTS, TRANSPORTS
 from handsteer.timeouts import ODOMETRY_S, RENEW_S, ROBOT_S, STALE_S
 from handsteer.types import ALWAYS_STOP, BUILT_IN, Action, CmdVelType, find_sign
@@ -254,7 +254,7 @@ class RobotConfig(Section):
         description="sim is the simulated robot; ros2, dds, zenoh and ros1 drive a real one, auto uses ros2 if "
         "installed, else dds",
     )
-    preset: Preset | None = Field(
+    preset: Annotated[Preset | None, EMPTY_IS_NONE] = Field(
         None, description="A robot with known topics, types and limits; the default for a real robot is generic"
     )
     cmd_vel_type: CmdVelType = Field(

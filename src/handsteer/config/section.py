@@ -19,7 +19,8 @@ from pydantic import (
 log = logging.getLogger(__name__)
 
 # ROS parameters have no null.
-OptionalPath = Annotated[Path | None, BeforeValidator(lambda path: None if path == "" else path)]
+EMPTY_IS_NONE: Final = BeforeValidator(lambda value: None if value == "" else value)
+OptionalPath = Annotated[Path | None, EMPTY_IS_NONE]
 
 _LIVE: Final[dict[str, JsonValue]] = {"live": True}
 _OLD_NAMES_SEEN: set[str] = set()
