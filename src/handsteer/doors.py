@@ -53,7 +53,7 @@ class SignAction(Protocol):
 
         Args:
             now: The velocity that is commanded so far.
-            since_last_s: Seconds since the last message with a sign, at most the time of a sign; 0 for the first.
+            since_last_s: Seconds since the last message with a sign, at most ``control.sign_timeout``; 0 for the first.
         """
         ...
 

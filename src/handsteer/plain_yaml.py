@@ -34,7 +34,17 @@ _SCALARS = _NUMBERS | {f"{_TAG}str", f"{_TAG}bool", f"{_TAG}null"}
 
 # Without libyaml, which all wheels have, the other loader reads the same, more slowly.
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """Constructs texts, numbers, booleans and null; a date is a text, as in JSON and in ROS 2's parameter files."""
+    """Constructs texts, numbers, booleans and null; a date is a text, as in JSON and in ROS 2's parameter files.
+
+    Keys are texts as they are written, as all of ours are names: ``Yes``, not true.
+    """
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                key.tag = f"{_TAG}str"
+        found: dict[Any, Any] = super().construct_mapping(node, deep)
+        return found
 
 
 _Loader.yaml_implicit_resolvers = {
@@ -65,7 +75,7 @@ def parse(text: str | bytes, source: str, error: type[HandsteerError]) -> Any:
         if len(text) > LARGEST_BYTES:
             raise _ProblemError(f"is larger than {LARGEST_BYTES // 1000} kB, which no such file should be")
         _look_through(text)
-        return yaml.load(text, _TextKeys)
+        return yaml.load(text, _Loader)
     except _ProblemError as problem:
         reason, line = str(problem), problem.line
     except yaml.YAMLError as problem:
@@ -155,17 +165,6 @@ def _look_through(text: str | bytes) -> None:
         if event.tag not in (None, "!", *_COLLECTIONS):
             raise _unknown_tag(event)
         around.append(_Table() if isinstance(event, yaml.MappingStartEvent) else None)
-
-
-class _TextKeys(_Loader):
-    """Reads the keys of tables as they are written, as all of ours are names: ``Yes`` is not true, and 12 no number."""
-
-    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode):
-                key.tag = f"{_TAG}str"
-        found: dict[Any, Any] = super().construct_mapping(node, deep)
-        return found
 
 
 class _Table:

@@ -211,14 +211,7 @@ class HandSignRecognitionNode(Node):
             self._on_played(self._picture(received, picture_of, began_s), received, began_s)
             return
         self._played.end()
-        self._refused = (
-            _BESIDE_PLAYER
-            if received.is_late
-            else self._age.why_refused(began_s, captured_s, is_far=self.is_camera_far)
-        )
-        hint = None if self._refused is None else self._recording.hint(began_s)
-        if hint and not received.is_late:
-            self._refused = hint
+        self._refused = self._why_old(began_s, captured_s, is_late=received.is_late)
         if self._refused is None and captured_s < self._camera_since_s:
             self._refused = "a picture of the camera before"
         if self._refused is None and self._stall_guard.distrusts(began_s):
@@ -230,6 +223,14 @@ class HandSignRecognitionNode(Node):
             self._pipeline.pass_over(mirrored(image) if self._config.swap_sides else image)
         if self._refused is not None:
             self._refused_s = began_s  # a stale or repeated frame does not count: the watchdog publishes NONE
+
+    def _why_old(self, began_s: float, captured_s: float, *, is_late: bool) -> str | None:
+        """Return why a frame is too old, in words; None if it is not. A late one says nothing of clocks."""
+        refused = None if is_late else self._age.why_refused(began_s, captured_s, is_far=self.is_camera_far)
+        if not (is_late or refused):
+            return None
+        hint = self._recording.hint(began_s)  # logged, too
+        return _BESIDE_PLAYER if is_late else hint or refused
 
     def _picture(
         self, received: Received[M], picture_of: Callable[[M], NDArray[np.uint8]], began_s: float

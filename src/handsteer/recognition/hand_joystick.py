@@ -119,7 +119,7 @@ class HandJoystick:
         self._closing: deque[_Seen] = deque(maxlen=30)
 
     def reconfigure(self, config: JoystickConfig) -> None:
-        """Change the parameters; if they differ, a hand that is held is released, which would be faster by some."""
+        """Change the parameters; if they differ, a held hand is released: its deflection would change at once."""
         if config != self._config:
             self.reset()
         self._config = config

@@ -28,6 +28,7 @@ from cyclonedds.topic import Topic
 
 from handsteer.messages import Image, type_name
 from handsteer.plugins.dds.topics import dds_type, describe, discovery_qos, host, misfits
+from handsteer.plugins.ros2.base_transport import unconnected
 from handsteer.transports.base import UNNAMED
 from handsteer.transports.encoding import NodeName, dds_type_name, ros_type_name, types
 
@@ -294,8 +295,5 @@ def reasons(ours: Endpoint, theirs: Endpoint) -> list[str]:
 
 def explain(ours: Endpoint, theirs: Endpoint, node: str | None) -> str:
     """Return one line with the two endpoints that are not connected, the reasons, and both profiles."""
-    who = node or UNNAMED
-    return (
-        f"{ours.topic.removeprefix('rt')}: nothing passes between our {ours.kind} and the {theirs.kind} of {who}: "
-        f"{'; '.join(reasons(ours, theirs))} (ours: {describe(ours.qos)}; theirs: {describe(theirs.qos)})"
-    )
+    why = f"{'; '.join(reasons(ours, theirs))} (ours: {describe(ours.qos)}; theirs: {describe(theirs.qos)})"
+    return unconnected(ours.topic.removeprefix("rt"), ours.kind, theirs.kind, node or UNNAMED, why)

@@ -71,6 +71,19 @@ def requested(topic: Topic[Any]) -> Profile:
     return Profile(topic.type not in (*_SENSOR_DATA, ClockMessage), topic.latched, topic.depth)
 
 
+def unconnected(topic: str, ours: str, theirs: str, node: str, why: str) -> str:
+    """Return one line on ends of a topic, each ``publisher`` or ``subscriber``, that exchange no messages.
+
+    Args:
+        topic: Full name of the topic.
+        ours: What our end is.
+        theirs: What the other end is.
+        node: Full name of its node.
+        why: The reason.
+    """
+    return f"{topic}: nothing passes between our {ours} and the {theirs} of {node}: {why}"
+
+
 class Writer(Protocol):
     """Sends the encoded messages of a topic, on any middleware."""
 

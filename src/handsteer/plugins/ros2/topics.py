@@ -22,7 +22,16 @@ from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverriding
 from handsteer.clock import Clock
 from handsteer.errors import TransportError
 from handsteer.messages import Topic, type_name
-from handsteer.plugins.ros2.base_transport import IMAGES, Profile, Ros2Transport, Take, are_players, offered, requested
+from handsteer.plugins.ros2.base_transport import (
+    IMAGES,
+    Profile,
+    Ros2Transport,
+    Take,
+    are_players,
+    offered,
+    requested,
+    unconnected,
+)
 
 _LOOK_S = 0.25
 _PLAYED_KEPT = 200
@@ -341,7 +350,7 @@ def _explained(ours: _End, theirs: Any, reasons: list[str], *, publishes: bool) 
     mine, other = ("publisher", "subscriber") if publishes else ("subscriber", "publisher")
     who = f"{theirs.node_namespace.rstrip('/')}/{theirs.node_name}"
     profiles = f"(ours: {', '.join(_in_words(ours.qos))}; theirs: {', '.join(_in_words(theirs.qos_profile))})"
-    return f"{ours.name}: nothing passes between our {mine} and the {other} of {who}: {'; '.join(reasons)} {profiles}"
+    return unconnected(ours.name, mine, other, who, f"{'; '.join(reasons)} {profiles}")
 
 
 def _in_words(qos: QoSProfile) -> list[str]:

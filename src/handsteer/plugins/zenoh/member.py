@@ -8,7 +8,7 @@ import time
 import zenoh
 
 from handsteer.errors import TransportError
-from handsteer.plugins.ros2.base_transport import Other, Profile
+from handsteer.plugins.ros2.base_transport import Other, Profile, unconnected
 from handsteer.plugins.zenoh.configuration import Network, reason, routers
 from handsteer.plugins.zenoh.keys import (
     Endpoint,
@@ -191,4 +191,4 @@ def explain(ours: Endpoint, theirs: Endpoint, node: str) -> str:
     else:
         hashes = f"ours: {ours.type_hash}; theirs: {theirs.type_hash}"
         why = f"both have the type {ours.type}, but it is defined differently ({hashes})"
-    return f"{ours.topic}: nothing passes between our {ours.kind} and the {theirs.kind} of {node}: {why}"
+    return unconnected(ours.topic, ours.kind, theirs.kind, node, why)

@@ -139,7 +139,7 @@ function followKeys(pad) {
 
 document.addEventListener("keydown", (event) => event.code === "Space" && letGo(), true);
 document.addEventListener("pointerdown", (event) => event.target.closest?.(".banner .stop") && letGo(), true);
-// As when a phone is turned: at another place of the pad, the finger would command something else.
+// When a phone is turned, the pad moves, and the finger on it would command something else.
 window.addEventListener("resize", () => {
   const before = held?.box, now = before && held.pad.getBoundingClientRect();
   if (now && Math.hypot(now.left - before.left, now.top - before.top) > MOST_MOVED_PX) releasePad();
