@@ -221,8 +221,8 @@ class ClockWatch:
 
     By their stamps, messages that arrive in order cannot age faster than time passes, and if the clocks are
     synchronized, none is from the future. A deviation of a second or more shows that a clock was set. Messages are then
-    observed for :data:`~handsteer.timeouts.RESYNC_S`, and again after a pause of more than twice that; if all agree, their
-    ages are corrected by the deviation.
+    observed for :data:`~handsteer.timeouts.RESYNC_S`, again after a pause of more than twice that; if all agree, their ages
+    are corrected by the deviation.
 
     Args:
         in_step: Whether the two clocks are expected to be synchronized.
