@@ -221,8 +221,8 @@ class ClockWatch:
 
     By their stamps, messages that arrive in order cannot age faster than time passes, and if the clocks are
     synchronized, none is from the future. A deviation of a second or more shows that a clock was set. Messages are then
-    observed for :data:`~handsteer.timeouts.RESYNC_S`, again after a pause of more than twice that; if all agree, their ages
-    are corrected by the deviation.
+    observed for :data:`~handsteer.timeouts.RESYNC_S`, again after a pause of more than twice that. If all of them
+    agree, their ages are corrected by the deviation.
 
     Args:
         in_step: Whether the two clocks are expected to be synchronized.
@@ -262,8 +262,10 @@ class ClockWatch:
             self._watched, self.set_by_s = (age_s, now_s), age_s - self._trusted[0]
         if self._watched is not None:
             return None
-        self._trusted = (age_s, now_s)
-        return age_s - self._correction_s
+        corrected_s = age_s - self._correction_s
+        if not self._in_step or corrected_s >= -STALE_S:  # one of the future would make the next ones look late
+            self._trusted = (age_s, now_s)
+        return corrected_s
 
     def _was_set(self, last_age_s: float, last_s: float, age_s: float, now_s: float) -> bool:
         set_back_s = age_s - last_age_s - (now_s - last_s)

@@ -171,6 +171,14 @@ def test_a_wrong_stamp_is_not_compared_with_another_wrong_one() -> None:
     assert age.why_refused(1010.0, 1002.0) is not None
 
 
+def test_a_stamp_that_is_a_second_ahead_makes_the_next_ones_not_late() -> None:
+    """One of a second ahead, then one of 0.25 s late: they looked like a clock that was set, and no frame counted."""
+    age = FrameAge(LIMIT_S)
+    delays_s = [0.01] * 30 + [-1.0, 0.25] + [0.01] * 60
+    told = [age.why_refused(number * PERIOD_S, number * PERIOD_S - delay_s) for number, delay_s in enumerate(delays_s)]
+    assert [number for number, why in enumerate(told) if why is not None] == [30]
+
+
 ODD_S = st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=10)
 
 
