@@ -2,13 +2,11 @@
 
 import importlib
 import logging
-import math
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
@@ -30,14 +28,11 @@ from handsteer.plugins.ros2.base_transport import (
     are_players,
     offered,
     requested,
-    unconnected,
 )
+from handsteer.plugins.ros2.matching import End, Matching
 
 _LOOK_S = 0.25
 _PLAYED_KEPT = 200
-_COMPARE_S = 1.0
-_NAME_DUE_S = 4.0
-_UNKNOWN, _REPORTED = "_NODE_NAME_UNKNOWN_", -math.inf
 _opening = threading.local()
 
 log = logging.getLogger(__name__)
@@ -85,9 +80,7 @@ class RclpyTransport(Ros2Transport):
         self._node = node
         self._missing: set[str] = set()
         self._is_open = True
-        self._ends: dict[tuple[str, bool], _End] = {}
-        self._compared_s = -math.inf
-        self._found: dict[tuple[int, ...], float] = {}
+        self._matching = Matching(node)
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
         """Return the full names of the ROS 2 nodes that publish ``topic``; killed ones remain for a while."""
@@ -122,8 +115,8 @@ class RclpyTransport(Ros2Transport):
                 event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
                 qos_overriding_options=self._overriding(name),
             )
-        end = _End(name, self._unresolved(topic), topic, publisher.qos_profile)
-        return _Writer(self._node, publisher, self._compare(end, publishes=True))
+        end = End(name, self._unresolved(topic), topic, publisher.qos_profile, publishes=True)
+        return _Writer(self._node, publisher, self._matching.add(end))
 
     def _open_reader(self, name: str, topic: Topic[Any], profile: Profile, take: Take) -> Callable[[], None]:
         kind = self._class_of(name, topic)
@@ -156,7 +149,7 @@ class RclpyTransport(Ros2Transport):
             live = open_(on_message, qos)
             end = partial(self._node.destroy_subscription, live)
         # Of two, the second one takes what the first one does not.
-        forget = self._compare(_End(name, self._unresolved(topic), topic, live.qos_profile), publishes=False)
+        forget = self._matching.add(End(name, self._unresolved(topic), topic, live.qos_profile, publishes=False))
 
         def close() -> None:
             forget()
@@ -164,38 +157,9 @@ class RclpyTransport(Ros2Transport):
 
         return close
 
-    def _compare(self, end: "_End", *, publishes: bool) -> Callable[[], None]:
-        """Compare our ``end`` of a topic with those of others, see :meth:`check`; return a function that ends it."""
-        key = (end.name, publishes)
-        self._ends[key] = end
-
-        def forget() -> None:
-            if self._ends.get(key) is end:
-                del self._ends[key]
-
-        return forget
-
     def check(self) -> None:
         """Log who is not connected to our publishers and subscriptions, once; called regularly."""
-        now_s = time.monotonic()
-        if now_s - self._compared_s < _COMPARE_S:
-            return
-        self._compared_s = now_s
-        node = self._node
-        for (_, publishes), end in tuple(self._ends.items()):
-            look = node.get_subscriptions_info_by_topic if publishes else node.get_publishers_info_by_topic
-            for theirs in look(end.asked):
-                found = _misfits(end, theirs, publishes=publishes)
-                if found and self._is_due(tuple(theirs.endpoint_gid), theirs.node_name, now_s):
-                    log.warning("%s", _explained(end, theirs, found, publishes=publishes))
-
-    def _is_due(self, gid: tuple[int, ...], node: str, now_s: float) -> bool:
-        """Return whether an end is to be reported now: once, and when its node's name is known, or will not be."""
-        since_s = self._found.setdefault(gid, now_s)
-        if since_s == _REPORTED or (node == _UNKNOWN and now_s - since_s < _NAME_DUE_S):
-            return False
-        self._found[gid] = _REPORTED
-        return True
+        self._matching.check()
 
     def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
         found = self._node.get_subscriptions_info_by_topic(self._unresolved(topic))
@@ -314,47 +278,6 @@ def ros_class(name: str) -> Any | None:
         return None
     # A ROS 1 package of the same name does not have this type support.
     return found if hasattr(type(found), "__import_type_support__") else None
-
-
-class _End(NamedTuple):
-    """Our publisher of a topic, or our subscription to it.
-
-    Attributes:
-        name: Full name of the topic, as in the graph.
-        asked: The same as rclpy is asked for it, which remaps it.
-        topic: The topic.
-        qos: The profile in use.
-    """
-
-    name: str
-    asked: str
-    topic: Topic[Any]
-    qos: QoSProfile
-
-
-def _misfits(ours: _End, theirs: Any, *, publishes: bool) -> list[str]:
-    """Return why our end is not connected to one of another node, in words; empty if it is."""
-    known = {type_name(each) for each in (ours.topic.type, ours.topic.or_type) if each is not None}
-    if theirs.topic_type not in known:
-        return [f"ours has the type {type_name(ours.topic.type)}, theirs {theirs.topic_type}"]
-    offer, request = (ours.qos, theirs.qos_profile) if publishes else (theirs.qos_profile, ours.qos)
-    # rclpy's own comparison takes an endless deadline for one where the other's is given as zero.
-    return [
-        f"the publisher is {offered}, the subscriber wants {wanted}"
-        for offered, wanted in zip(_in_words(offer), _in_words(request), strict=True)
-        if (offered, wanted) in (("best effort", "reliable"), ("volatile", "transient local"))
-    ]
-
-
-def _explained(ours: _End, theirs: Any, reasons: list[str], *, publishes: bool) -> str:
-    mine, other = ("publisher", "subscriber") if publishes else ("subscriber", "publisher")
-    who = f"{theirs.node_namespace.rstrip('/')}/{theirs.node_name}"
-    profiles = f"(ours: {', '.join(_in_words(ours.qos))}; theirs: {', '.join(_in_words(theirs.qos_profile))})"
-    return unconnected(ours.name, mine, other, who, f"{'; '.join(reasons)} {profiles}")
-
-
-def _in_words(qos: QoSProfile) -> list[str]:
-    return [str(each.name).lower().replace("_", " ") for each in (qos.reliability, qos.durability)]
 
 
 @contextmanager

@@ -1,0 +1,109 @@
+"""Which nodes are not connected to our ends of topics, and why: rclpy itself names neither them nor the profiles."""
+
+import logging
+import math
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from handsteer.messages import Topic, type_name
+from handsteer.plugins.ros2.base_transport import unconnected
+
+_COMPARE_S = 1.0
+_NAME_DUE_S = 4.0
+_UNKNOWN, _REPORTED = "_NODE_NAME_UNKNOWN_", -math.inf
+
+log = logging.getLogger(__name__)
+
+
+class End(NamedTuple):
+    """Our publisher of a topic, or our subscription to it.
+
+    Attributes:
+        name: Full name of the topic, as in the graph.
+        asked: The same as rclpy is asked for it, which remaps it.
+        topic: The topic.
+        qos: The profile in use.
+        publishes: Whether it is a publisher.
+    """
+
+    name: str
+    asked: str
+    topic: Topic[Any]
+    qos: QoSProfile
+    publishes: bool
+
+
+class Matching:
+    """Compares our ends of topics with those of other nodes.
+
+    Args:
+        node: The node of rclpy that has our ends.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._ends: dict[tuple[str, bool], End] = {}
+        self._compared_s = -math.inf
+        self._found: dict[tuple[int, ...], float] = {}
+
+    def add(self, end: End) -> Callable[[], None]:
+        """Compare ``end`` from now on, instead of one on the same topic; return a function that ends it."""
+        key = (end.name, end.publishes)
+        self._ends[key] = end
+
+        def forget() -> None:
+            if self._ends.get(key) is end:
+                del self._ends[key]
+
+        return forget
+
+    def check(self) -> None:
+        """Log who is not connected, once each; looks once a second at most."""
+        now_s = time.monotonic()
+        if now_s - self._compared_s < _COMPARE_S:
+            return
+        self._compared_s = now_s
+        node = self._node
+        for ours in tuple(self._ends.values()):
+            look = node.get_subscriptions_info_by_topic if ours.publishes else node.get_publishers_info_by_topic
+            for theirs in look(ours.asked):
+                found = _misfits(ours, theirs)
+                if found and self._is_due(tuple(theirs.endpoint_gid), theirs.node_name, now_s):
+                    log.warning("%s", _explained(ours, theirs, found))
+
+    def _is_due(self, gid: tuple[int, ...], node: str, now_s: float) -> bool:
+        """Return whether an end is to be reported now: once, and when its node's name is known, or will not be."""
+        since_s = self._found.setdefault(gid, now_s)
+        if since_s == _REPORTED or (node == _UNKNOWN and now_s - since_s < _NAME_DUE_S):
+            return False
+        self._found[gid] = _REPORTED
+        return True
+
+
+def _misfits(ours: End, theirs: Any) -> list[str]:
+    """Return why our end is not connected to one of another node, in words; empty if it is."""
+    known = {type_name(each) for each in (ours.topic.type, ours.topic.or_type) if each is not None}
+    if theirs.topic_type not in known:
+        return [f"ours has the type {type_name(ours.topic.type)}, theirs {theirs.topic_type}"]
+    offer, request = (ours.qos, theirs.qos_profile) if ours.publishes else (theirs.qos_profile, ours.qos)
+    # rclpy's own comparison takes an endless deadline for one where the other's is given as zero.
+    return [
+        f"the publisher is {offered}, the subscriber wants {wanted}"
+        for offered, wanted in zip(_in_words(offer), _in_words(request), strict=True)
+        if (offered, wanted) in (("best effort", "reliable"), ("volatile", "transient local"))
+    ]
+
+
+def _explained(ours: End, theirs: Any, reasons: list[str]) -> str:
+    mine, other = ("publisher", "subscriber") if ours.publishes else ("subscriber", "publisher")
+    who = f"{theirs.node_namespace.rstrip('/')}/{theirs.node_name}"
+    profiles = f"(ours: {', '.join(_in_words(ours.qos))}; theirs: {', '.join(_in_words(theirs.qos_profile))})"
+    return unconnected(ours.name, mine, other, who, f"{'; '.join(reasons)} {profiles}")
+
+
+def _in_words(qos: QoSProfile) -> list[str]:
+    return [str(each.name).lower().replace("_", " ") for each in (qos.reliability, qos.durability)]
