@@ -3,6 +3,6 @@
 ``base_transport`` has what all of ROS 2 share: profiles, encoded messages, late ones. rclpy's features are not
 reimplemented.
 
-``session``, ``topics`` and ``matching`` are rclpy's. ``arguments``, ``base_session``, ``base_transport`` and ``parameter_services``
-do without it what rclpy does, for DDS and Zenoh. Imports the kernel only.
+``session``, ``topics`` and ``matching`` are rclpy's. ``arguments``, ``base_session``, ``base_transport`` and
+``parameter_services`` do without it what rclpy does, for DDS and Zenoh. Imports the kernel only.
 """
