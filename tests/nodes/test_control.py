@@ -627,6 +627,24 @@ def test_who_has_no_page_reads_in_the_log_that_it_waits_for_neutral(caplog: pyte
     ]
 
 
+def test_who_has_no_page_reads_in_the_log_that_the_hand_has_to_engage(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO)
+    bench = ControlBench(arming=True, engage=True)
+    bench.show(*["Stop"] * 20, *["Forward"] * 20)
+    bench.make_gesture()
+    bench.show(*["Forward"] * 5)
+    assert bench.twists[-1].linear.x > 0.0
+    bench.run(1.0)
+    assert [record.message for record in caplog.records if "arm" in record.message or "engaged" in record.message] == [
+        "disarmed (has just started): nothing moves by signs before Stop was shown, or no hand",
+        "disengaged: open, close and open your hand to begin",
+        "armed: signs count once the hand has engaged",
+        "engaged: the hand drives",
+        "disarmed (no sign came): nothing moves by signs before Stop was shown, or no hand",
+        "disengaged: open, close and open your hand to begin",
+    ]
+
+
 def test_a_robot_that_is_let_grow_slowly_is_not_said_to_stand() -> None:
     bench = Bench()
     config = ControlConfig(max_linear_acceleration=0.05)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from handsteer.audit import ERROR, INFO, WARN, AuditCode, AuditEvent, write_event
 from handsteer.clock import Clock
 from handsteer.control import Source
+from handsteer.control.engagement import Engagement
 from handsteer.control.explain import Reason
 from handsteer.control.safety import Safety
 from handsteer.messages import AUDIT
@@ -113,13 +114,13 @@ class ControlAudit:
     def __init__(self, auditor: Auditor, stoppers: Callable[[], str]) -> None:
         self._auditor = auditor
         self._stoppers = stoppers
-        self._waited = False
+        self._waited, self._engaged = False, True
 
     def look(self, safety: Safety, source: Source, reason: Reason, at_s: float) -> None:
         """Publish what has changed until ``at_s``."""
         look, event = self._auditor.look, self._auditor.event
         stopped, engaged, waits = safety.is_stopped, safety.engagement.engaged, safety.signs_wait
-        self._log_arming(waits)
+        self._log_interlocks(waits, safety.engagement)
         look("stopped", stopped, at_s, lambda: self._stop_event(stopped), first=False)
         look("armed", waits, at_s, lambda: self._arming_event(waits))
         words = "the hand drives" if engaged else "the hand drives nothing until it has engaged"
@@ -148,14 +149,16 @@ class ControlAudit:
         why = waits or "was reset"
         return self._auditor.event("disarmed", f"disarmed ({why}): nothing moves by signs before Stop, or no hand", why)
 
-    def _log_arming(self, waits: str | None) -> None:
-        """Log when signs begin and cease to wait for neutral, for users without the page."""
+    def _log_interlocks(self, waits: str | None, engagement: Engagement) -> None:
+        """Log when the hand begins and ceases to wait for neutral, or to have to engage, for users without the page."""
         if waits is not None and not self._waited:
             why = waits or "after a reset"
             log.info("disarmed (%s): nothing moves by signs before Stop was shown, or no hand", why)
         elif self._waited and waits is None:
-            log.info("armed: signs count again")
-        self._waited = waits is not None
+            log.info("armed: signs count %s", "again" if engagement.engaged else "once the hand has engaged")
+        if engagement.engaged != self._engaged:
+            log.info("engaged: the hand drives" if engagement.engaged else str(engagement.reason))
+        self._waited, self._engaged = waits is not None, engagement.engaged
 
 
 _SOURCES: dict[Source, str] = {
