@@ -153,6 +153,27 @@ def test_the_topics_are_those_that_the_args_say(ros: LaunchGraph) -> None:
     assert not {HAND_SIGN, CMD_VEL} & set(ros.topics())
 
 
+def test_what_respawns_under_another_master_keeps_what_it_was_launched_with(ros: LaunchGraph) -> None:
+    ros.launch(*DRIVE_ROBOT, "world:=empty")
+    ros.launch(*SIGN_CONTROL, VIRTUAL, "publish_gesture_topic:=words", "control_topic:=/my/cmd_vel", "engage:=on")
+    wanted = {
+        "/my_camera/source": "virtual",
+        "/hand_sign_recognition/publish_gesture_topic": "words",
+        "/hand_sign_control/publish_gesture_topic": "words",
+        "/hand_sign_control/control_topic": "/my/cmd_vel",
+        "/hand_sign_control/engage": "on",
+        "/hand_sign_control/arming": "course",
+        "/robot/world": "empty",
+    }
+
+    def found() -> dict[str, Any]:
+        return {name: ros.master.getParam("/test", name)[2] for name in wanted}
+
+    eventually(lambda: found() == wanted and set(CHAIN) <= ros.nodes(), what="all of them to start")
+    ros.restart_master()
+    eventually(lambda: found() == wanted and set(CHAIN) <= ros.nodes(), 120.0, "all of them to come back")
+
+
 def test_recognition_takes_any_camera_nodes_topic(ros: LaunchGraph) -> None:
     show(ros, "Forward:600", "/front/my_camera")
     ros.launch("my_cam", "my_cam.launch", VIRTUAL, ROS_NAMESPACE="front")

@@ -297,6 +297,29 @@ def test_another_master_in_the_status_of_the_first_is_not_taken_for_it(tmp_path:
         driver.expect((0.01, 0.0), (0.0, 0.0))
 
 
+def test_a_stop_outlives_the_master(tmp_path: Any) -> None:
+    with ros1_graph(tmp_path) as graph:
+
+        def call(service: str) -> str:
+            command = ["rosservice", "call", f"/{NODE}/{service}"]
+            return subprocess.run(command, env=graph.env, check=False, capture_output=True, text=True).stdout
+
+        control = graph.node("control", *PATIENT, name=f"/{NODE}")
+        eventually(lambda: "success: True" in call("stop"), what="its services")
+        graph.restart_master()
+        assert control.code() == 2
+        control = graph.node("control", *PATIENT, name=f"/{NODE}")
+        eventually(lambda: "stopped, until it is reset" in call("engage_state"), what="it to be stopped")
+        assert "stays stopped until it is reset" in control.text
+        call("reset")
+        eventually(lambda: "until it is reset" not in call("engage_state"), what="it to be reset")
+        graph.restart_master()
+        assert control.code() == 2
+        control = graph.node("control", *PATIENT, name=f"/{NODE}")
+        eventually(lambda: "engaged" in call("engage_state"), what="its services")
+        assert "until it is reset" not in call("engage_state") + control.text
+
+
 class TestChain(ChainContract):
     @pytest.fixture(scope="class")
     @classmethod

@@ -24,6 +24,7 @@ except ImportError as problem:
     ) from None
 
 from handsteer.plugins.ros1 import course
+from handsteer.plugins.ros1.last_stop import LastStop
 from handsteer.plugins.ros1.master import Lifeline, Master, MasterGone
 from handsteer.plugins.ros1.topics import Ros1Transport
 from handsteer.transports.timing import ClockMonitor
@@ -74,7 +75,11 @@ class Ros1Session(Session):
         self.parameters: dict[str, Any] = translated.parameters
         rospy.on_shutdown(self._on_shutdown)
         self.clock = self._make_clock()
-        self.transport = Ros1Transport(self.clock, translated.topics)
+        self._last_stop = LastStop(uri, self.name)
+        was_stopped = self._last_stop.take()
+        if was_stopped:
+            log.warning("the robot was stopped when this node lost its master: it stays stopped until it is reset")
+        self.transport: Ros1Transport = Ros1Transport(self.clock, translated.topics, was_stopped=was_stopped)
         self._watcher = threading.Thread(target=self._watch, name="ros1_session", daemon=True)
         self._watcher.start()
 
@@ -104,6 +109,8 @@ class Ros1Session(Session):
         if self._left.is_set():
             return
         self._left.wait(_DELIVER_S)
+        if self._lost and self.transport.is_stopped:
+            self._last_stop.keep()
         self.transport.close()
         self._left.set()
         rospy.signal_shutdown("the node has ended")

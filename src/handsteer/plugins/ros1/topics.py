@@ -17,7 +17,7 @@ import rospy
 from rospy.impl.tcpros_pubsub import QueuedConnection
 
 from handsteer.clock import Clock
-from handsteer.messages import Topic, type_name
+from handsteer.messages import STOPPED, Bool, Topic, type_name
 from handsteer.plugins.ros1.conversion import from_ros1, ros1_type, to_ros1
 from handsteer.plugins.ros1.master import SystemState
 from handsteer.timeouts import HEAR_STOP_S
@@ -46,13 +46,15 @@ class Ros1Transport(BaseTransport):
     Args:
         clock: The graph's clock.
         topics: New names of topics, by their full default names. Remapping overrides it.
+        was_stopped: Whether subscribers of ``/stopped`` are first told of a Stop.
     """
 
     # TCP loses no part of a large image, and the course's cameras publish raw ones only.
     crosses_network = False
 
-    def __init__(self, clock: Clock, topics: Mapping[str, str] | None = None) -> None:
+    def __init__(self, clock: Clock, topics: Mapping[str, str] | None = None, *, was_stopped: bool = False) -> None:
         super().__init__(set())
+        self._was_stopped = was_stopped
         self._clock = clock
         self._topics = topics or {}
         self._state = SystemState()
@@ -80,6 +82,14 @@ class Ros1Transport(BaseTransport):
         """Return the ROS node's name and ``node``, as in ROS's own diagnostics: ``r1/my_camera: my_camera``."""
         return f"{rospy.get_name().removeprefix('/')}: {node}"
 
+    @property
+    def is_stopped(self) -> bool:
+        """Whether this process has published last on ``/stopped`` that the robot is stopped."""
+        name = self.topic_name(STOPPED)
+        with self._lock:
+            mine = [each for each in self._publishers if isinstance(each, _Ros1Publisher) and each.name == name]
+        return any(publisher.latched == Bool(data=True) for publisher in mine)
+
     def close(self) -> None:
         """End all publishing and receiving; may be called twice."""
         self._state.close()
@@ -97,6 +107,9 @@ class Ros1Transport(BaseTransport):
             stops = topic.stops
             kept = _Kept(self._state.publishers_before(name)) if stops is not None else None
             stale = None if topic.lifespan_s is None else StaleMessageFilter(topic.lifespan_s)
+
+            if self._was_stopped and topic.name == STOPPED.name:
+                send(Received(topic.type(data=True)))  # type: ignore[call-arg]
 
             def on_message(theirs: Any) -> None:
                 message = from_ros1(theirs, kind)
@@ -164,6 +177,7 @@ class _Kept:
 class _Ros1Publisher(BasePublisher[M]):
     def __init__(self, node: str, name: str, topic: Topic[M]) -> None:
         super().__init__(node, name, topic)
+        self.latched: M | None = None
         self._numbers = itertools.count(1)
         kind = ros1_type(type_name(topic.type))
         self._publisher: Any = rospy.Publisher(
@@ -186,6 +200,8 @@ class _Ros1Publisher(BasePublisher[M]):
         publisher = self._publisher
         if publisher is None:
             return
+        if self.topic.latched:
+            self.latched = message
         try:
             # rospy's senders, one per subscriber, drop messages for slow ones.
             publisher.publish(to_ros1(message, next(self._numbers)))
