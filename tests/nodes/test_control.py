@@ -627,6 +627,22 @@ def test_who_has_no_page_reads_in_the_log_that_it_waits_for_neutral(caplog: pyte
     ]
 
 
+@pytest.mark.parametrize("robots", [(), ("r1", "r2")], ids=["one robot", "several"])
+def test_neutral_that_no_robot_can_follow_does_not_count(
+    robots: tuple[str, ...], caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    bench = Bench()
+    config = ControlConfig(robots=robots)
+    bench.nodes = [control := HandSignControlNode(bench.transport, bench.clock, config, arming=True)]
+    signs = bench.transport.advertise("recognition", HAND_SIGN)
+    for _ in range(90):
+        signs.publish(String(data="Stop"), bench.clock.now())
+        bench.run(1 / 30)
+        assert not control._report().armed
+    assert len([record for record in caplog.records if "arm" in record.message]) == 1
+
+
 def test_who_has_no_page_reads_in_the_log_that_the_hand_has_to_engage(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
     bench = ControlBench(arming=True, engage=True)

@@ -283,9 +283,11 @@ class HandSignControlNode(Node):
             elapsed_s = self._elapsed()
             if self._stall_guard.distrusts(self.clock.now()):
                 sign = stick = steering = None
-            self._look_after_the_robot(elapsed_s)
+            away = self._look_after_the_robot(elapsed_s)
             self._select_by(sign)
             velocity = self._control.step(elapsed_s, sign=sign, stick=stick, steering=steering, by=by)
+            if away is not None:
+                self._lose_the_robot(away)  # neutral that it could not follow does not count
             self._publish(velocity, captured_s)
             self._calm_down()
 
@@ -324,20 +326,24 @@ class HandSignControlNode(Node):
         source = "none" if self._safety.is_stopped else self._mux.source
         self._audit.look(self._safety, source, self._reason, now_s)
 
-    def _look_after_the_robot(self, elapsed_s: float) -> None:
+    def _look_after_the_robot(self, elapsed_s: float) -> str | None:
+        """Stop, and wait for neutral, if the robot does not follow; return why, or None."""
         changed = self._selection.follow() if self._selection else self._cmd_vel.follow()
         away = "another robot listens" if changed else None if self._cmd_vel.has_subscribers else "no robot listens"
         if away is None and self._following is not None:
             away = self._following.step(elapsed_s, self._commanded)
         if self._monitor.why_blind():
             away = "laser scans did not come"
-        if away is None:
-            return
+        if away is not None:
+            self._lose_the_robot(away)
+            self._publish(self._control.halt())
+        return away
+
+    def _lose_the_robot(self, away: str) -> None:
         if self._following is not None and self._following.is_silent:
             self._safety.disarm(away)  # whatever the robot is: what it does now is not known
         else:
             self._safety.robot_is_away(away)
-        self._publish(self._control.halt())
 
     def _select_by(self, sign: str | None) -> None:
         """Select the next robot when a sign with that action begins."""
