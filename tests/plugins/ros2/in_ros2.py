@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Bool as TheirBool
 from std_msgs.msg import String as TheirString
 
 from handsteer.clock import SimulatedClock
@@ -22,6 +23,7 @@ from handsteer.messages import (
     IMAGE_COMPRESSED,
     IMAGE_RAW,
     ROBOT_DESCRIPTION,
+    SELECTED_ROBOT,
     STOP,
     TF,
     String,
@@ -168,6 +170,19 @@ def test_who_is_not_connected_is_named_once_by_the_names_of_the_graph(
         session.wait(0.2)
     (line,) = [line for line in caplog.text.splitlines() if "nothing passes" in line]
     assert "/swapped: nothing passes between our publisher and the subscriber of /other: the publisher is vol" in line
+    node.destroy_node()
+    context.shutdown()
+
+
+def test_publishers_of_another_type_are_not_those_of_a_topic(joined: Join, domain: int) -> None:
+    context = rclpy.Context()
+    context.init(args=[], domain_id=domain)
+    node = rclpy.create_node("other", context=context)
+    node.create_publisher(TheirBool, "/gesture/hand_sign", 1)
+    node.create_publisher(TheirString, "/selected_robot", 1)
+    transport = joined().transport
+    assert eventually(lambda: transport.publishers_of(SELECTED_ROBOT) == ["/other"])
+    assert transport.publishers_of(HAND_SIGN) == []
     node.destroy_node()
     context.shutdown()
 

@@ -28,6 +28,8 @@ from handsteer.messages import (
     LaserScan,
     Odometry,
     Topic,
+    Twist,
+    TwistStamped,
     type_name,
 )
 from handsteer.timeouts import STALE_S
@@ -226,6 +228,12 @@ class Ros2Transport(BaseTransport):
         """Return the types of the subscribers of ``topic`` in other processes."""
 
 
+def types_of(topic: Topic[Any]) -> set[str]:
+    """Return the names of the types that ``topic`` may have: a command is a Twist or a TwistStamped."""
+    kinds = {topic.type, topic.or_type or topic.type}
+    return {type_name(kind) for kind in (kinds | {Twist, TwistStamped} if kinds & {Twist, TwistStamped} else kinds)}
+
+
 class Other(NamedTuple):
     """A publisher or subscriber in another process: the full name of its node, and the type of its messages."""
 
@@ -249,7 +257,10 @@ class WireTransport(Ros2Transport):
 
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
         """Return the full names of the ROS 2 nodes that publish ``topic``, in this process and others."""
-        others = [other.node for other in self._others(self.topic_name(topic)) if other.publishes]
+        kinds = types_of(topic)
+        others = [
+            other.node for other in self._others(self.topic_name(topic)) if other.publishes and other.type in kinds
+        ]
         return sorted([*super().publishers_of(topic), *others])
 
     def topic_name(self, topic: Topic[Any]) -> str:

@@ -11,6 +11,7 @@ from rclpy.qos import QoSProfile
 
 from handsteer.messages import Topic, type_name
 from handsteer.plugins.ros2.base_transport import unconnected
+from handsteer.transports.base import UNNAMED
 
 _COMPARE_S = 1.0
 _NAME_DUE_S = 4.0
@@ -84,6 +85,11 @@ class Matching:
         return True
 
 
+def node_of(end: Any) -> str:
+    """Return the full name of the node of an end of a topic, as rclpy describes it."""
+    return UNNAMED if end.node_name == _UNKNOWN else f"{end.node_namespace.rstrip('/')}/{end.node_name}"
+
+
 def _misfits(ours: End, theirs: Any) -> list[str]:
     """Return why our end is not connected to one of another node, in words; empty if it is."""
     known = {type_name(each) for each in (ours.topic.type, ours.topic.or_type) if each is not None}
@@ -100,9 +106,8 @@ def _misfits(ours: End, theirs: Any) -> list[str]:
 
 def _explained(ours: End, theirs: Any, reasons: list[str]) -> str:
     mine, other = ("publisher", "subscriber") if ours.publishes else ("subscriber", "publisher")
-    who = f"{theirs.node_namespace.rstrip('/')}/{theirs.node_name}"
     profiles = f"(ours: {', '.join(_in_words(ours.qos))}; theirs: {', '.join(_in_words(theirs.qos_profile))})"
-    return unconnected(ours.name, mine, other, who, f"{'; '.join(reasons)} {profiles}")
+    return unconnected(ours.name, mine, other, node_of(theirs), f"{'; '.join(reasons)} {profiles}")
 
 
 def _in_words(qos: QoSProfile) -> list[str]:

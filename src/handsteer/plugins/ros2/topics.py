@@ -28,8 +28,9 @@ from handsteer.plugins.ros2.base_transport import (
     are_players,
     offered,
     requested,
+    types_of,
 )
-from handsteer.plugins.ros2.matching import End, Matching
+from handsteer.plugins.ros2.matching import End, Matching, node_of
 
 _LOOK_S = 0.25
 _PLAYED_KEPT = 200
@@ -85,7 +86,8 @@ class RclpyTransport(Ros2Transport):
     def publishers_of(self, topic: Topic[Any]) -> list[str]:
         """Return the full names of the ROS 2 nodes that publish ``topic``; killed ones remain for a while."""
         found = self._node.get_publishers_info_by_topic(self._unresolved(topic)) if self._is_open else []
-        return sorted(f"{one.node_namespace.rstrip('/')}/{one.node_name}" for one in found)
+        kinds = types_of(topic)
+        return sorted(node_of(one) for one in found if one.topic_type in kinds)
 
     def topic_name(self, topic: Topic[Any]) -> str:
         """Return the topic's full name in the graph, remapped.
