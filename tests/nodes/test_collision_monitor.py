@@ -193,6 +193,41 @@ def test_scans_that_say_nothing_stop_the_robot(caplog: pytest.LogCaptureFixture)
     assert caplog.text.count("laser scans have no valid range") == 1
 
 
+def behind() -> RangeScan:
+    """Return a scan of what is behind only, where nothing is."""
+    return RangeScan(math.pi / 2, math.tau / 360, 0.05, 8.0, np.full(180, np.inf, np.float32))
+
+
+@pytest.mark.parametrize("second", ["another half", "another frame"])
+def test_scans_of_two_scanners_on_one_topic_stop_the_robot(second: str, caplog: pytest.LogCaptureFixture) -> None:
+    bench = MonitorBench()
+    bench.show("Forward", 10, ahead(7.0))
+    assert bench.command[0] > 0.0
+    for _ in range(10):
+        bench.show("Forward", 1, ahead(0.7))
+        if second == "another half":
+            bench.scan(behind())
+        else:
+            header = Header(bench.clock.stamp(bench.clock.now()), "rear_scan")
+            bench.scans.publish(scan_message(header, ahead(7.0)), bench.clock.now())
+        bench.show("Forward", 1)
+    assert bench.command == (0.0, 0.0)
+    assert "several scanners" in bench.report()[0]
+    assert len([record for record in caplog.records if "several scanners" in record.message]) == 1
+    for _ in range(100):
+        bench.show("Stop", 1, ahead(7.0))
+    bench.show("Forward", 10, ahead(7.0))
+    assert bench.command[0] > 0.0
+
+
+def test_a_scanner_whose_scans_differ_in_length_is_one() -> None:
+    bench = MonitorBench()
+    for shorter in range(0, 10):
+        ranges = np.full(360 - shorter, 7.0, np.float32)
+        bench.show("Forward", 1, RangeScan(-math.pi, math.tau / 360, 0.05, 8.0, ranges))
+    assert bench.command[0] > 0.0
+
+
 def test_it_can_be_turned_on_and_off_while_it_runs() -> None:
     bench = MonitorBench(CollisionMonitorConfig())
     bench.control.reconfigure(Config(collision_monitor=RULE))

@@ -627,6 +627,18 @@ def test_who_has_no_page_reads_in_the_log_that_it_waits_for_neutral(caplog: pyte
     ]
 
 
+@pytest.mark.parametrize("word", ["x" * 100_000, "Go\x1b[2J", "Forward\n"], ids=["long", "escape", "line"])
+def test_what_cannot_be_the_name_of_a_sign_stops_and_is_no_neutral(word: str) -> None:
+    bench = ControlBench(arming=True)
+    bench.show(*["Stop"] * 40, *["Forward"] * 10)
+    assert bench.twists[-1].linear.x > 0.0
+    bench.show(word)
+    assert bench.twists[-1] == twist(0.0, 0.0)
+    bench.show(*[word] * 60)
+    bench.show(*["Forward"] * 3)
+    assert bench.twists[-1] == twist(0.0, 0.0), "neutral has to be shown"
+
+
 @pytest.mark.parametrize("robots", [(), ("r1", "r2")], ids=["one robot", "several"])
 def test_neutral_that_no_robot_can_follow_does_not_count(
     robots: tuple[str, ...], caplog: pytest.LogCaptureFixture

@@ -693,3 +693,14 @@ def test_a_node_that_is_stuck_says_that_it_was_not_deactivated(bench: Recognitio
     with bench.node._serving:
         assert not bench.node.set_active(False, timeout_s=0.01)
     assert bench.node.is_active
+
+
+def test_two_cameras_on_one_topic_are_logged_and_one_on_each_is_not(caplog: pytest.LogCaptureFixture) -> None:
+    bench = RecognitionBench()
+    others: list[Any] = [bench.transport.advertise("front", IMAGE_COMPRESSED)]
+    bench.run(10.0)
+    assert not caplog.records
+    others.append(bench.transport.advertise("intruder", IMAGE_RAW))
+    bench.run(10.0)
+    (line,) = [record.message for record in caplog.records]
+    assert "/image_raw has 2 publishers (camera, intruder), and signs are recognised in the images of all" in line

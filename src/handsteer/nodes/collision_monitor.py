@@ -12,7 +12,7 @@ from handsteer.control.footprint import points_of
 from handsteer.control.obstacles import ObstacleLimiter
 from handsteer.messages import LaserScan, Odometry, Pose, Topic
 from handsteer.nodes.base import Node
-from handsteer.nodes.frozen_scans import FrozenScans
+from handsteer.nodes.frozen_scans import FrozenScans, MixedScans
 from handsteer.transports.base import Received
 from handsteer.transports.timing import Repeats
 from handsteer.types import Velocity
@@ -81,6 +81,7 @@ class CollisionMonitor:
         self._is_broken = False
         self._repeats = Repeats()
         self._frozen, self._is_frozen = FrozenScans(), False
+        self._mixed, self._is_mixed = MixedScans(), False
         self._stands = False
         self._kind = "off"
         self._beside = ""
@@ -140,6 +141,8 @@ class CollisionMonitor:
         if now - self._came_s > rule.source_timeout:
             since = f" for {now - self._came_s:.1f} s" if math.isfinite(self._came_s) else ""
             return f"no laser scan has come{since}, so what is in the way is not known"
+        if self._is_mixed:
+            return "laser scans of several scanners or sectors come on one topic, so what is in the way is not known"
         if self._is_frozen:
             return "the laser scans do not change while the robot moves, so what is in the way is not known"
         if self._is_broken:
@@ -170,9 +173,22 @@ class CollisionMonitor:
             (log.warning if self._is_broken else log.info)(
                 "laser scans %s", "have no valid range" if self._is_broken else "are valid again"
             )
-        if points is not None:
+        if points is not None and not self._mixes(received.message, now):
             captured_s = now if received.captured_s is None else received.captured_s
             self._limiter.see(points, min(captured_s, now))
+
+    def _mixes(self, scan: LaserScan, now_s: float) -> bool:
+        """Return whether scans cover different angles in turn; then nothing is known of what is in the way."""
+        is_mixed = self._mixed.note(scan, now_s)
+        if is_mixed != self._is_mixed:
+            self._is_mixed = is_mixed
+            (log.warning if is_mixed else log.info)(
+                "laser scans %s",
+                "of several scanners or sectors come on one topic" if is_mixed else "are of one scanner",
+            )
+        if is_mixed:
+            self._limiter.forget()
+        return is_mixed
 
     def _freezes(self, scan: LaserScan) -> bool:
         """Return whether scans are frozen; then nothing is known of what is in the way, until one differs."""

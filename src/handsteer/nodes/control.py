@@ -51,6 +51,8 @@ log = logging.getLogger(__name__)
 
 _WATCHDOG_PERIOD_S = 0.02
 _DIAGNOSE_PERIOD_S = 0.1
+_LONGEST_SIGN = 100
+"""Longer words, in characters, are not names of signs."""
 _STOPPED = "stopped, until it is reset"
 
 
@@ -214,6 +216,9 @@ class HandSignControlNode(Node):
 
     def _on_sign(self, received: Received[String]) -> None:
         sign = received.message.data
+        if len(sign) > _LONGEST_SIGN or not sign.isprintable():
+            self._take(received.captured_s, is_late=True, is_stop=True)
+            return
         is_stop = action_of(sign, self._config.actions) == "stop"
         self._take(received.captured_s, is_late=self._is_stale(received), is_stop=is_stop, sign=sign)
 

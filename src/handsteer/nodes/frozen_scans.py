@@ -1,4 +1,4 @@
-"""Finds out that a scanner repeats one scan as new ones while the robot moves."""
+"""Finds out that a scanner repeats one scan while the robot moves, or that scans are of several scanners."""
 
 import math
 
@@ -10,6 +10,29 @@ from handsteer.messages import NO_STAMP, LaserScan, Pose
 _MOVED_M, _TURNED_RAD = 0.1, 0.1
 # Walls that are parallel to a straight way look the same all along it; at this angle and distance nothing can be one.
 _AHEAD_RAD, _NEAR_M = math.radians(5), 4.0
+
+
+_MIXED_S = 2.0
+# Some scanners turn a little more or less for each scan.
+_SAME_RAD = 0.2
+
+
+class MixedScans:
+    """Compares what scans cover: of several scanners on one topic, or of sectors, each hides what the others see."""
+
+    def __init__(self) -> None:
+        self._covered: tuple[str, float, float] | None = None
+        self._changed_s = -math.inf
+
+    def note(self, scan: LaserScan, now_s: float) -> bool:
+        """Return whether the frame or the angles of the scans have changed in the last two seconds."""
+        before, last_rad = self._covered, scan.angle_min + scan.angle_increment * (len(scan.ranges) - 1)
+        frame, lowest, highest = scan.header.frame_id, min(scan.angle_min, last_rad), max(scan.angle_min, last_rad)
+        self._covered = frame, lowest, highest
+        if before is not None:
+            is_same = before[0] == frame and math.dist(before[1:], (lowest, highest)) <= _SAME_RAD
+            self._changed_s = self._changed_s if is_same else now_s
+        return now_s - self._changed_s < _MIXED_S
 
 
 class FrozenScans:

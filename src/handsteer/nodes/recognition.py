@@ -2,7 +2,8 @@
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -33,7 +34,7 @@ from handsteer.messages import (
 from handsteer.nodes.base import Node
 from handsteer.nodes.callbacks import Queue
 from handsteer.nodes.status import RecognitionStatus
-from handsteer.nodes.supervision import StopKeeper
+from handsteer.nodes.supervision import Look, Rivals, StopKeeper
 from handsteer.nodes.timing import (
     CALM_S,
     TOO_SLOW,
@@ -153,6 +154,10 @@ class HandSignRecognitionNode(Node):
         self._chooses = wanted == "auto"
         self._wants_compressed = False
         self.every(_CHOOSE_PERIOD_S, self._choose_images)
+        cameras: dict[str, Look] = {
+            transport.topic_name(topic): partial(self._cameras_on, topic) for topic in (image, compressed)
+        }
+        Rivals(self, [], cameras, _many_cameras)
         self._watchdog = self.every(_WATCH_PERIOD_S, self._watch)
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 
@@ -335,6 +340,10 @@ class HandSignRecognitionNode(Node):
         here, there = (self.transport.topic_name(topic) for topic in (taken, other))
         log.info("no node publishes %s: images are taken from %s, of %s", here, there, ", ".join(names(other)))
 
+    def _cameras_on(self, topic: Topic[Any]) -> list[str]:
+        """Return who publishes ``topic``; nobody if images are not taken from it."""
+        return self.transport.publishers_of(topic) if (topic == self._jpegs) == self._compressed else []
+
     def _change_images(self) -> None:
         self._images.close()
         self._compressed = not self._compressed
@@ -411,6 +420,13 @@ class HandSignRecognitionNode(Node):
         if not self._config.swap_sides:
             return hand.handedness
         return "Left" if hand.handedness == "Right" else "Right"
+
+
+def _many_cameras(topic: str, cameras: Sequence[str]) -> str:
+    return (
+        f"{topic} has {len(cameras)} publishers ({', '.join(cameras)}), and signs are recognised in the images of all "
+        "in turn: end all but one, or give each a topic of its own by remapping"
+    )
 
 
 _GONE = (-1, -1)

@@ -79,19 +79,27 @@ class StopKeeper:
 
 
 class Rivals:
-    """Checks the publishers of command topics once a second.
+    """Checks once a second that each of some topics has one publisher only.
 
     Args:
         node: The node that runs the check, on its thread and transport.
         topics: Topics that must have only one publisher.
         elsewhere: Further topics by name, of another graph; each value returns the nodes that publish there.
+        explain: Returns the warning about a topic and its publishers.
 
     Attributes:
         warning: The problem in one sentence; empty if there is none.
     """
 
-    def __init__(self, node: Node, topics: Sequence[Topic[Any]], elsewhere: dict[str, Look] | None = None) -> None:
+    def __init__(
+        self,
+        node: Node,
+        topics: Sequence[Topic[Any]],
+        elsewhere: dict[str, Look] | None = None,
+        explain: Callable[[str, Sequence[str]], str] = many_publishers,
+    ) -> None:
         self.warning = ""
+        self._explain = explain
         self._node = node
         self._looks: dict[str, Look] = {
             node.transport.topic_name(topic): partial(node.transport.publishers_of, topic) for topic in topics
@@ -115,4 +123,4 @@ class Rivals:
             return ""
         self._seen[topic] = self._seen.get(topic, 0) + 1
         is_sure = self._seen[topic] >= (_LOOKS_FOR_NAMES if UNNAMED in publishers else _LOOKS)
-        return many_publishers(topic, publishers) if is_sure else ""
+        return self._explain(topic, publishers) if is_sure else ""

@@ -160,6 +160,7 @@ const WORDS = {
   "no report yet": "noch keine Meldung",
   "no laser scan has come for # s, so what is in the way is not known": "seit # s kam kein Laserscan, was im Weg ist, ist also unbekannt",
   "no laser scan has come, so what is in the way is not known": "es kam kein Laserscan, was im Weg ist, ist also unbekannt",
+  "laser scans of several scanners or sectors come on one topic, so what is in the way is not known": "auf einem Topic kommen Laserscans mehrerer Scanner oder Abschnitte, was im Weg ist, ist also unbekannt",
   "the laser scans that come have no valid range, so what is in the way is not known": "die Laserscans haben keinen gültigen Abstand, was im Weg ist, ist also unbekannt",
   "laser scans come # s after their stamp: are the clocks synchronised?": "Laserscans kommen # s nach ihrem Zeitstempel: sind die Uhren synchron?",
   "{} has # publishers ({}), and a robot obeys all of them in turn: end all but one, or give each a topic of its own by remapping": "{} hat # Publisher ({}), und ein Roboter gehorcht allen abwechselnd: beende alle bis auf einen, oder gib jedem durch Remapping ein eigenes Topic",
