@@ -203,6 +203,61 @@ def test_what_is_not_kept_leaves_no_file_and_can_be_continued(school: School) ->
     assert [one.label for one in ann(school).state.classes] == [NONE]
 
 
+@pytest.fixture
+def taught(school: School) -> School:
+    """Where Hi and Ho are taught already: Hi stops."""
+    save_custom_model(model(), school.folder / "mine.npz")
+    save_dataset(Dataset((*takes("Hi", "Peace", count=1), *takes("Ho", "OK", count=1))), school.folder / "signs.npz")
+    actions = school.initial.control.model_copy(update={"actions": {"Hi": "stop", "Ho": "turbo"}})
+    signs = school.initial.signs.model_copy(update={"model": school.folder / "mine.npz"})
+    school.config = school.initial.model_copy(update={"control": actions, "signs": signs})
+    school.lessons.begin("ann")
+    return school
+
+
+def key_of(node: LessonNode, label: str) -> int:
+    return next(one.key for one in node.state.classes if one.label == label)
+
+
+def delete(node: LessonNode, label: str) -> None:
+    key = key_of(node, label)
+    node.do(lambda lesson: lesson.delete_class(key))
+
+
+def test_a_sign_that_is_renamed_or_deleted_keeps_its_action_while_the_model_knows_it(taught: School) -> None:
+    node = ann(taught)
+    node.do(lambda lesson: lesson.rename(key_of(node, "Hi"), "Halt"))
+    delete(node, "Ho")
+    taught.lessons.save("ann", {"Halt": "stop"})
+    assert node.state.message == KEPT_TAKES
+    assert taught.config.control.actions == {"Hi": "stop", "Ho": "turbo", "Halt": "stop"}
+    assert load_custom_model(taught.folder / "mine.npz").labels == ("Hi", "Ho")
+
+
+def test_after_the_last_sign_is_deleted_the_model_is_gone_too(taught: School) -> None:
+    node = ann(taught)
+    delete(node, "Hi")
+    delete(node, "Ho")
+    taught.lessons.save("ann", {})
+    assert (taught.config.signs.model, taught.config.control.actions) == (None, {})
+    assert taught.files == {"signs.npz"}
+    assert node.state.model is None
+    assert not node.state.is_changed
+
+
+def test_what_another_program_has_added_is_not_lost_when_a_lesson_is_continued(school: School) -> None:
+    path = school.folder / "signs.npz"
+    save_dataset(Dataset(tuple(takes("Hi", "Peace", count=2))), path)
+    begin(school, "Wave")
+    school.lessons.end("ann")
+    save_dataset(Dataset((*takes("Hi", "Peace", count=2), *takes("Ho", "OK", count=3))), path)
+    school.lessons.begin("ann", restore=True)
+    assert [one.label for one in ann(school).state.classes] == ["Hi", "Wave", "Ho", NONE]
+    school.lessons.save("ann", {})
+    kept = load_dataset(path)
+    assert {label: len(kept.of(label)) for label in kept.labels} == {"Hi": 2, "Ho": 3}
+
+
 def test_a_file_is_added_or_refused_in_one_sentence(school: School) -> None:
     school.lessons.begin("ann")
     path = school.folder / "upload.npz"

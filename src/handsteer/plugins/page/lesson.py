@@ -221,6 +221,10 @@ class Lesson:
         model = self.state.model if self.state.is_fresh else self.state.kept_model
         self._set(kept=self.state.classes, kept_model=model, message=message)
 
+    def forget_model(self) -> None:
+        """Try no model any more: what it knew is deleted."""
+        self._set(model=None, kept_model=None, learnt_from=None, report=None, take_numbers=())
+
     def say(self, message: str) -> None:
         """Show an error, or what has happened."""
         self._set(message=message)

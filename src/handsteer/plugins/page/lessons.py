@@ -59,6 +59,7 @@ class Lessons:
         self._lock = threading.RLock()
         self._current: _Current | None = None
         self._draft: LessonState | None = None
+        self._draft_read: _Version = None
         self._closed = False
 
     @property
@@ -123,6 +124,8 @@ class Lessons:
                 return
             if restore and self._draft is not None:
                 lesson.restore(self._draft)
+                if read != self._draft_read:
+                    lesson.add_dataset(dataset, None)  # of another program, since then
             self._draft = None
             node = LessonNode(self._graph.transport, self._graph.clock, lesson, self._open_models)
             self._current = _Current(viewer, node, read)
@@ -154,18 +157,29 @@ class Lessons:
             if _version(path) != current.read:
                 raise DatasetError(f"{path} was changed by another program: end the lesson, and begin another")
             message = KEPT_TAKES
-            if state.model is not None and (state.is_fresh or state.learnt_from is None):
+            if not labels and state.model is not None:
+                self._forget_model(state)
+                current.node.do(Lesson.forget_model)
+                message = KEPT
+            elif state.model is not None and (state.is_fresh or state.learnt_from is None):
                 for label in state.model.labels:
                     if label in labels and label not in effects and self.chosen_action(label, state) is None:
                         raise ConfigError(f"choose first what the robot does at {label}")
                 if state.is_fresh:
                     save_custom_model(state.model, self.model_path.expanduser())
-                removed = [one.label for one in state.kept if one.label not in labels]
+                removed = {one.label for one in state.kept} - {*labels, *state.model.labels}
                 self._graph.reconfigure(with_signs(self._graph.config, self.model_path, effects, removed))
-                message = KEPT
+                message = KEPT_TAKES if state.lost else KEPT
             save_dataset(dataset, path)
             current.read = _version(path)
             current.node.do(lambda lesson: lesson.mark_kept(message))
+
+    def _forget_model(self, state: LessonState) -> None:
+        """Delete the model of signs that are all deleted, and let the graph use none."""
+        removed = {one.label for one in state.kept}
+        path, config = self.model_path.expanduser(), self._graph.config
+        self._graph.reconfigure(with_signs(config, None, {}, removed))
+        path.unlink(missing_ok=True)
 
     def share(self, viewer: str, path: Path) -> bool:
         """Write the takes and the model of the lesson of ``viewer`` to ``path``; return whether there is a lesson.
@@ -208,7 +222,7 @@ class Lessons:
         current, self._current = self._current, None
         if current is not None:
             if current.node.state.is_changed:
-                self._draft = current.node.state
+                self._draft, self._draft_read = current.node.state, current.read
             # Off this thread, which may be the server's: a frame may be in progress.
             threading.Thread(target=current.node.stop, name="lesson_end", daemon=True).start()
 
@@ -223,8 +237,10 @@ def _open_models(config: Config) -> tuple[Landmarker, Classifier]:
     return open_landmarker(config), open_classifier(config.signs.model_copy(update={"model": None}))
 
 
-def with_signs(config: Config, model: Path, actions: Mapping[str, Action], removed: Iterable[str] = ()) -> Config:
-    """Return ``config`` with another model of taught signs, their actions, and without those of ``removed`` signs.
+def with_signs(
+    config: Config, model: Path | None, actions: Mapping[str, Action], removed: Iterable[str] = ()
+) -> Config:
+    """Return ``config`` with another ``model`` of taught signs, their actions, and without those of ``removed`` signs.
 
     Raises:
         ConfigError: A sign cannot have its action.
