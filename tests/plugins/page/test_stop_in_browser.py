@@ -8,12 +8,25 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Locator, Page, Route
 
+from handsteer.config import load
+from handsteer.graph import Graph
 from handsteer.messages import STOP
+from tests.plugins.page.browsers import a_browser
+from tests.plugins.page.served import page_process
 from tests.plugins.page.test_sticks_in_browser import PLUG_IN, phone
-from tests.plugins.page.visits import NEEDS_A_BROWSER, Visit, each_when_there_is_time, visiting
+from tests.plugins.page.visits import (
+    NEEDS_A_BROWSER,
+    PATIENCE_MS,
+    WINDOW,
+    Visit,
+    each_when_there_is_time,
+    visiting,
+)
+from tests.processes import free_port
 
 pytestmark = NEEDS_A_BROWSER
 OPENERS = 3
+QUIET = {"camera": {"source": "virtual", "width": 320, "height": 240, "fps": 5}, "virtual_hand": {"script": "Stop:600"}}
 
 
 @contextlib.contextmanager
@@ -191,3 +204,35 @@ def test_a_stop_that_the_server_refuses_is_not_repeated_without_end(visit: Visit
     visit.wait_until(lambda: is_stopped(visit) and bool(answers))
     page.wait_for_timeout(1000)
     assert len(answers) <= 4
+
+
+def test_a_space_key_without_a_code_stops_too(visit: Visit) -> None:
+    """As on-screen keyboards and remote desktops send it."""
+    session = visit.page.context.new_cdp_session(visit.page)
+    for kind in ("keyDown", "keyUp"):
+        session.send("Input.dispatchKeyEvent", {"type": kind, "key": " ", "code": "", "windowsVirtualKeyCode": 32})
+    visit.wait_until(lambda: is_stopped(visit))
+
+
+def test_a_page_that_is_left_open_over_a_restart_says_that_it_knows_nothing() -> None:
+    dashboard = {"port": free_port(), "token": "always"}
+    with Graph(load(None, QUIET, {"dashboard": dashboard})) as graph, a_browser() as browser:
+        served = page_process()
+        page = browser.new_page(viewport=WINDOW, locale="en-US")
+        page.set_default_timeout(PATIENCE_MS)
+        page.goto(served.serve(graph))
+        graph.start()
+        page.locator(".banner .headline").wait_for()
+        page.wait_for_function("window.socket?.connected")
+        assert page.locator(".banner .lost:visible").count() == 0
+        served.stop()
+        page.locator(".lost.again:visible").wait_for()
+        assert not page.locator(".banner .headline").is_visible()
+        served = page_process()
+        served.serve(graph)
+        page.locator(".lost.elsewhere:visible").wait_for()
+        page.locator(".banner .stop").click()
+        page.wait_for_function("document.documentElement.dataset.stop === 'refused'")
+        assert page.locator(".stop .refused").is_visible()
+        page.context.close()
+        served.stop()

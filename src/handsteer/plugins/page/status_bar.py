@@ -160,6 +160,10 @@ class Banner:
             with box("words"):
                 self._headline = text("headline", "Starting")
                 self._reason = text("reason", "Waiting for the first report")
+                # Shown by static/page.js while the server does not answer.
+                text("lost title", "Connection lost")
+                text("lost again", "what is shown may be old")
+                text("lost elsewhere", "handsteer has restarted: open its new address")
             self._warning = text("warning hidden", "")
             with box("buttons"):
                 self._camera = (
@@ -172,6 +176,7 @@ class Banner:
                 with stop:
                     text("pressed sent", "Sent")
                     text("pressed confirmed", "Stopped")
+                    text("pressed refused", "No effect")
         ui.on("space", lambda event: halt(event.args))
         self._mood = ""
 

@@ -1,7 +1,7 @@
-"""Trains in a separate process, so that a robot can be driven meanwhile.
+"""Trains in a separate process, so that a robot can be driven meanwhile, and with one thread.
 
 In the process of a graph, training would block the interpreter for the nodes, and the linear algebra library would use
-all processors: if they are busy, its threads wait for each other, and training takes ten times as long.
+all processors: if one is busy, its threads wait for each other, and training takes several times as long.
 """
 
 import contextlib
@@ -54,7 +54,10 @@ class BackgroundTraining:
             command = [sys.executable, "-P", "-m", __name__]
             path = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
             environment = {**os.environ, **_ONE_THREAD, "PYTHONPATH": path}
-            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
+            # A session of its own: Ctrl-C interrupts this process, which ends the other.
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, start_new_session=True
+            )
         with self._process as process:
             try:
                 answer = _follow(process, self._work, progress)

@@ -24,7 +24,8 @@ async function sendStop(number) {
   try {
     const signal = AbortSignal.timeout(PATIENCE_MS);
     const answer = await fetch(`/stop?page=${window.clientId}&press=${number}`, { method: "POST", signal });
-    if (answer.status === 403) refused = number; // this browser's session is gone: only the websocket is left
+    if (answer.status === 401) document.documentElement.dataset.stop = "refused"; // handsteer has restarted
+    if (answer.status === 401 || answer.status === 403) refused = number; // this browser's session is gone: only the websocket is left
     if (!answer.ok || confirmed >= number) return;
   } catch {
     return; // repeated
@@ -52,15 +53,31 @@ document.addEventListener("click", (event) => {
 }, true);
 
 // Anywhere except where a space can be typed; a focused button would otherwise take the space key as a click.
+// On-screen keyboards and remote desktops send keys without a code.
+const isSpace = (event) => event.code === "Space" || event.key === " ";
+window.isSpace = isSpace;
 const TAKES_SPACE = "input:not([type=number], [inputmode=decimal], [type=color], [readonly]), textarea:not([readonly]), [contenteditable]";
 document.addEventListener("keydown", (event) => {
-  if (event.code !== "Space" || event.target.closest?.(TAKES_SPACE)) return;
+  if (!isSpace(event) || event.target.closest?.(TAKES_SPACE)) return;
   event.preventDefault();
   if (!event.repeat) emitEvent("space", { press: pressStop() });
 }, true);
 document.addEventListener("keyup", (event) => {
-  if (event.code === "Space" && event.target.closest?.("button")) event.preventDefault();
+  if (isSpace(event) && event.target.closest?.("button")) event.preventDefault();
 }, true);
+
+// data-lost on the root: the server does not answer, so what is shown may be old; "refused" if this page has no access.
+const LOOK_MS = 500, OWN_ADDRESS = document.currentScript.src;
+let wasConnected = false;
+setInterval(async () => {
+  const data = document.documentElement.dataset, connected = window.socket?.connected ?? false;
+  wasConnected ||= connected;
+  if (connected) delete data.lost;
+  if (connected || !wasConnected || data.lost === "refused") return;
+  data.lost = "";
+  const answer = await fetch(OWN_ADDRESS, { cache: "no-store", signal: AbortSignal.timeout(PATIENCE_MS) }).catch(() => null);
+  if (answer?.status === 401) data.lost = "refused";
+}, LOOK_MS);
 
 document.addEventListener("click", (event) => {
   if (!event.target.closest?.(".theme")) return;

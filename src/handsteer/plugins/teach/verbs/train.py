@@ -90,12 +90,10 @@ def train(
     """
     from tqdm import tqdm
 
-    from handsteer.config import SignsConfig
+    from handsteer.plugins.teach.background import BackgroundTraining
     from handsteer.plugins.teach.dataset import Dataset, load_dataset
-    from handsteer.plugins.teach.train import train_signs
     from handsteer.plugins.teach.verbs.tables import teaching_tables
     from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
-    from handsteer.recognition.recognizer import open_classifier
 
     check_writable("--output", output, TrainingError, load_custom_model)
     parts = [load_dataset(path) for path in datasets or (_DATASET,)]
@@ -107,8 +105,9 @@ def train(
             bar.total = of
             bar.update(done - bar.n)
 
-        shipped = open_classifier(SignsConfig())
-        model, report = train_signs(dataset, shipped, sided=tuple(sided or ()), progress=progress)
+        learnt = BackgroundTraining(dataset, sided or ()).run(progress)
+    assert learnt is not None  # it is never cancelled
+    model, report = learnt
     save_custom_model(model, output)
     print(json_format.dumps({"model": str(output), **report.as_dict()}) if json else teaching_tables(report))
     for each in report.left_out:
