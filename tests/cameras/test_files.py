@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handsteer.cameras import Camera, EndOfStream
-from handsteer.cameras.files import PhotoFolder, VideoFile
+from handsteer.cameras.files import PhotoFolder, VideoFile, find_photos
 from handsteer.clock import SteppedClock
 from handsteer.errors import CameraNotFound, CameraUnreadable
 from handsteer.testing.camera_contract import CameraContract
@@ -110,3 +110,20 @@ def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
         VideoFile(tmp_path / "gone.mp4", SteppedClock())
     with pytest.raises(CameraNotFound, match=r"there are no photos in .*: expected files such as"):
         PhotoFolder(tmp_path, SteppedClock())
+
+
+@pytest.mark.parametrize("suffix", [".webp", ".bmp", ".TIFF"])
+def test_a_picture_of_another_kind_is_not_taken_for_a_video(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"hand{suffix}"
+    cv2.imwrite(str(path), np.full((48, 64, 3), 90, np.uint8))
+    with pytest.raises(CameraUnreadable, match=r"is a picture that is neither a JPEG nor a PNG file: convert it"):
+        VideoFile(path, SteppedClock())
+
+
+def test_pictures_of_another_kind_in_a_folder_are_counted(photos: Path, caplog: pytest.LogCaptureFixture) -> None:
+    for name in ("x.webp", "y.heic"):
+        (photos / name).write_bytes(b"")
+    assert not {path.name for path in find_photos(photos)} & {"x.webp", "y.heic"}
+    (line,) = [record.message for record in caplog.records]
+    assert "2 pictures" in line
+    assert "x.webp" in line

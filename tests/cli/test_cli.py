@@ -10,6 +10,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from handsteer.cli import main
@@ -187,6 +189,13 @@ def test_recognize_prints_a_line_a_frame(capsys: pytest.CaptureFixture[str], sli
 def test_recognize_a_photo(capsys: pytest.CaptureFixture[str], data_dir: Path) -> None:
     photo = sorted((data_dir / "photos" / "stop").glob("emre*"))[0]
     assert "Stop" in prints(capsys, "recognize", str(photo))
+
+
+def test_a_photo_that_cannot_be_a_frame_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cv2.imwrite(str(tmp_path / "thin.png"), np.zeros((1, 40_000, 3), np.uint8))
+    with pytest.raises(SystemExit):
+        main(["recognize", str(tmp_path)])
+    assert re.search(r"thin\.png: .*40000x1", capsys.readouterr().err)
 
 
 def test_doctor_finds_what_is_missing(

@@ -1,5 +1,6 @@
 """Frames from a video file or a folder of photos."""
 
+import logging
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
@@ -14,8 +15,11 @@ from handsteer.errors import CameraNotFound, CameraUnreadable, FrameError
 from handsteer.picture_files import MOST_PIXELS, decode
 from handsteer.regular_files import open_regular
 
+log = logging.getLogger(__name__)
+
 AtEnd = Literal["loop", "hold", "end"]
 PHOTO_SUFFIXES = frozenset({".jpg", ".jpeg", ".png"})
+_OTHER_PICTURES = frozenset({".webp", ".bmp", ".tif", ".tiff", ".avif", ".heic", ".heif"})
 BAGS = frozenset({".bag", ".db3"})
 
 LARGEST_PHOTO_BYTES = 100_000_000
@@ -58,6 +62,8 @@ class VideoFile:
         self._at_end = at_end
         if not path.is_file():
             raise CameraNotFound(f"there is no video file {path}")
+        if path.suffix.lower() in _OTHER_PICTURES:  # OpenCV would play it as a video of one frame
+            raise CameraUnreadable(f"{path} is a picture that is neither a JPEG nor a PNG file: convert it")
         try:
             path.open("rb").close()
         except OSError as error:
@@ -186,7 +192,12 @@ def find_photos(path: Path) -> list[Path]:
         return [path]
     if not path.is_dir():
         raise CameraNotFound(f"there is no photo or folder {path}")
-    photos = sorted(file for file in path.rglob("*") if file.suffix.lower() in PHOTO_SUFFIXES)
+    files = sorted(path.rglob("*"))
+    photos = [file for file in files if file.suffix.lower() in PHOTO_SUFFIXES]
+    others = [file for file in files if file.suffix.lower() in _OTHER_PICTURES]
+    if others:
+        number = f"{len(others)} picture{'s' if len(others) > 1 else ''}"
+        log.warning("%s, such as %s, left out: convert what is neither JPEG nor PNG", number, others[0])
     if not photos:
         raise CameraNotFound(f"there are no photos in {path}: expected files such as .jpg or .png")
     return photos

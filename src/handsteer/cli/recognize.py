@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
 from handsteer.cli.running import say, settings
-from handsteer.errors import CameraNotFound
+from handsteer.errors import CameraNotFound, CameraUnreadable, FrameError
 
 if TYPE_CHECKING:
     from handsteer.recognition.recognizer import Recognition, Recognizer
@@ -83,7 +83,11 @@ def _photos(source: Path, recognizer: "Recognizer") -> Iterator[_Result]:
     from handsteer.cameras.files import find_photos, read_photo
 
     for path in find_photos(source):
-        yield _result(path, 0, 0.0, recognizer.recognize(read_photo(path)))
+        try:
+            recognition = recognizer.recognize(read_photo(path))
+        except FrameError as error:
+            raise CameraUnreadable(f"{path}: {error}") from None
+        yield _result(path, 0, 0.0, recognition)
 
 
 def _video(path: Path, recognizer: "Recognizer") -> Iterator[_Result]:

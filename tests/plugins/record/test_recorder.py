@@ -150,3 +150,18 @@ def test_a_folder_that_cannot_be_written_to(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="cannot record to"):
         McapWriter(tmp_path / "missing" / "drive.mcap")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_a_disk_that_is_full_at_the_start_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "drive.mcap"
+    opened = Path.open
+
+    def on_a_full_disk(self: Path, mode: str) -> object:
+        opened(self, mode).close()
+        return opened(Path("/dev/full"), "wb")
+
+    monkeypatch.setattr(Path, "open", on_a_full_disk)
+    with pytest.raises(RecordingError, match=r"cannot record to .*drive\.mcap: No space left on device"):
+        McapWriter(path)
+    assert not path.exists()

@@ -1,5 +1,6 @@
 """Writes messages to an MCAP file with the profile ``ros2``, as ``ros2 bag record`` does."""
 
+import contextlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -51,7 +52,14 @@ class McapWriter:
         except OSError as error:
             raise RecordingError(f"cannot record to {path}: {error.strerror}") from None
         self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES, compression=CompressionType.LZ4)
-        self._writer.start(profile="ros2", library="handsteer")
+        try:
+            self._writer.start(profile="ros2", library="handsteer")
+            self._file.flush()
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                self._file.close()
+            path.unlink(missing_ok=True)
+            raise RecordingError(f"cannot record to {path}: {error.strerror}") from None
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
 
