@@ -341,7 +341,7 @@ class HandSignRecognitionNode(Node):
         log.info("no node publishes %s: images are taken from %s, of %s", here, there, ", ".join(names(other)))
 
     def _cameras_on(self, topic: Topic[Any]) -> list[str]:
-        """Return who publishes ``topic``; nobody if images are not taken from it."""
+        """Return the nodes that publish ``topic``; none if images are not taken from it."""
         return self.transport.publishers_of(topic) if (topic == self._jpegs) == self._compressed else []
 
     def _change_images(self) -> None:

@@ -84,11 +84,12 @@ class Ros1Transport(BaseTransport):
 
     @property
     def is_stopped(self) -> bool:
-        """Whether this process has published last on ``/stopped`` that the robot is stopped."""
+        """Whether this process has published last on ``/stopped`` that the robot is stopped, or was told so."""
         name = self.topic_name(STOPPED)
         with self._lock:
             mine = [each for each in self._publishers if isinstance(each, _Ros1Publisher) and each.name == name]
-        return any(publisher.latched == Bool(data=True) for publisher in mine)
+        said = [publisher.latched for publisher in mine if publisher.latched is not None]
+        return Bool(data=True) in said if said else self._was_stopped
 
     def close(self) -> None:
         """End all publishing and receiving; may be called twice."""

@@ -24,8 +24,9 @@ async function sendStop(number) {
   try {
     const signal = AbortSignal.timeout(PATIENCE_MS);
     const answer = await fetch(`/stop?page=${window.clientId}&press=${number}`, { method: "POST", signal });
-    if (answer.status === 401) document.documentElement.dataset.stop = "refused"; // handsteer has restarted
-    if (answer.status === 401 || answer.status === 403) refused = number; // this browser's session is gone: only the websocket is left
+    // This browser's session is gone: only the websocket is left; without access, as after a restart, not even that.
+    if (answer.status === 401 || answer.status === 403) refused = number;
+    if (answer.status === 401) document.documentElement.dataset.stop = "refused";
     if (!answer.ok || confirmed >= number) return;
   } catch {
     return; // repeated
