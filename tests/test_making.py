@@ -3,9 +3,12 @@ from typing import Any
 
 import pytest
 
+from handsteer.cameras import VIRTUAL_HAND, choose
 from handsteer.clock import SteppedClock
 from handsteer.config import Config
-from handsteer.making import make_control
+from handsteer.errors import CameraNotFound
+from handsteer.graph import Graph
+from handsteer.making import make_camera, make_control, open_robot
 from handsteer.messages import CMD_VEL, HAND_SIGN, String, Topic
 from handsteer.nodes.control import HandSignControlNode
 from handsteer.transports.in_process import InProcessTransport
@@ -75,3 +78,25 @@ def test_the_courses_robot_may_be_in_the_namespace_of_its_control() -> None:
     node = make_control(config, Namespaced(), SteppedClock())
     assert isinstance(node, HandSignControlNode)
     assert node._report().engaged
+
+
+@pytest.fixture
+def no_webcam(monkeypatch: pytest.MonkeyPatch) -> Config:
+    monkeypatch.setattr(choose, "webcams", lambda: [])
+    return Config.model_validate({"camera": {"source": "auto", "width": 320, "height": 240}})
+
+
+def test_without_a_webcam_the_virtual_hand_drives_the_simulated_robot(no_webcam: Config) -> None:
+    with Graph(no_webcam, SteppedClock()) as graph:
+        assert graph.cameras.name == VIRTUAL_HAND
+
+
+def test_without_a_webcam_no_virtual_hand_drives_what_may_be_a_real_robot(no_webcam: Config) -> None:
+    bench, real = Bench(), open_robot(no_webcam, SteppedClock())
+    with pytest.raises(CameraNotFound, match="has to be named"):
+        make_camera(no_webcam, bench.transport, bench.clock)
+    with pytest.raises(CameraNotFound, match="has to be named"):
+        Graph(no_webcam, SteppedClock(), robot=real)
+    named = no_webcam.model_copy(update={"camera": no_webcam.camera.model_copy(update={"source": "virtual"})})
+    with Graph(named, SteppedClock(), robot=real) as graph:
+        assert graph.cameras.name == VIRTUAL_HAND

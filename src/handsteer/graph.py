@@ -122,14 +122,15 @@ class Graph:
             joy=GESTURE_JOY,
             camera_changed=CAMERA_CHANGED,
         )
-        self.cameras = open_cameras(config, self.clock, camera)
+        simulated = robot is None and config.robot.kind == "sim"
+        self.cameras = open_cameras(config, self.clock, camera, may_be_real=not simulated)
         self.cameras.on_change = self._tell_of_camera
         self._camera_changed = self.transport.advertise("my_camera", CAMERA_CHANGED)
         self.camera = make_camera(config, *wires, self.cameras, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED)
         self.control = make_control(
             config,
             *noted[1],
-            simulated=robot is None and config.robot.kind == "sim",
+            simulated=simulated,
             sign=HAND_SIGN,
             joy=GESTURE_JOY,
             camera_changed=CAMERA_CHANGED,

@@ -40,13 +40,15 @@ def make_camera(
 ) -> "CameraNode":
     """Return the node ``my_camera``; without a ``camera``, it opens the one that ``config`` names.
 
+    What robot its pictures drive is not known, so it may be a real one.
+
     Raises:
         CameraError: The camera, or its calibration, cannot be used.
     """
     from handsteer.cameras.choose import open_camera, read_calibration
     from handsteer.nodes.camera import CameraNode
 
-    camera = camera or open_camera(config, clock)
+    camera = camera or open_camera(config, clock, may_be_real=True)
     calibration = (
         None if config.camera.calibration is None else read_calibration(config.camera.calibration.expanduser())
     )
@@ -56,10 +58,13 @@ def make_camera(
     return CameraNode(transport, clock, camera, frame_id, calibration, **topics)
 
 
-def open_cameras(config: Config, clock: Clock, own: "Camera | None" = None) -> "ChoiceOfCameras":
+def open_cameras(
+    config: Config, clock: Clock, own: "Camera | None" = None, *, may_be_real: bool = False
+) -> "ChoiceOfCameras":
     """Return this machine's cameras and the browser's, one of which is selected at a time.
 
-    ``own`` is selected first; without it, the camera that ``config`` names is opened.
+    ``own`` is selected first; without it, the camera that ``config`` names is opened, which is not the virtual hand
+    without being named if the robot ``may_be_real``.
 
     Raises:
         CameraError: The machine's own camera cannot be used.
@@ -69,7 +74,7 @@ def open_cameras(config: Config, clock: Clock, own: "Camera | None" = None) -> "
     from handsteer.cameras.choose import MachineCameras, open_camera
 
     has_own = own is not None or config.camera.source != "browser"
-    own = own or (open_camera(config, clock) if has_own else NoCamera())
+    own = own or (open_camera(config, clock, may_be_real=may_be_real) if has_own else NoCamera())
     machine = MachineCameras(config, clock, own)
     return ChoiceOfCameras(own, BrowserCamera(clock), machine, OWN if has_own else BROWSER)
 

@@ -26,10 +26,17 @@ _MATRICES = {"camera_matrix": 9, "rectification_matrix": 9, "projection_matrix":
 _WHOLE = RegionOfInterest(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
 
 
-def open_camera(config: Config, clock: Clock) -> Camera:
+_NO_WEBCAM = (
+    "no webcam delivers a picture: connect one, or name another camera, such as an address, or browser with handsteer "
+    "run. Where the robot may be real, the virtual hand, which drives without a person, has to be named too: virtual"
+)
+
+
+def open_camera(config: Config, clock: Clock, *, may_be_real: bool = False) -> Camera:
     """Return the camera that ``config.camera.source`` names.
 
-    ``auto`` is the first webcam that delivers a frame, else the virtual hand; the log reports which.
+    ``auto`` is the first webcam that delivers a frame, else the virtual hand; the log reports which. The virtual hand
+    shows what drives, and what engages, so ``auto`` does not fall back to it if the robot ``may_be_real``.
 
     Raises:
         CameraError: It cannot be used; the message suggests what to do.
@@ -37,7 +44,12 @@ def open_camera(config: Config, clock: Clock) -> Camera:
     """
     source = config.camera.source
     if source == "auto":
-        return _first_webcam(config.camera, clock) or doors.CAMERAS.open(_VIRTUAL.source, config, clock)
+        webcam = _first_webcam(config.camera, clock)
+        if webcam is None and may_be_real:
+            raise CameraNotFound(_NO_WEBCAM)
+        if webcam is None:
+            log.info("no webcam delivers a picture: using the virtual hand")
+        return webcam or doors.CAMERAS.open(_VIRTUAL.source, config, clock)
     if source == "browser":
         raise CameraNotFound("the browser's camera needs the page: handsteer run --camera browser")
     if source in doors.CAMERAS.names():
@@ -59,7 +71,6 @@ def _first_webcam(config: CameraConfig, clock: Clock) -> Camera | None:
         else:
             log.info("using %s", camera.name)
             return camera
-    log.info("no webcam delivers a picture: using the virtual hand")
     return None
 
 

@@ -25,8 +25,9 @@ class CameraConfig(Section):
 
     source: str = Field(
         "auto",
-        description="auto, virtual, browser (of the device that shows the page), a webcam's index or /dev/videoN, "
-        "an address (rtsp, http), a video file or a folder of photos",
+        description="auto (a webcam, else the virtual hand for the simulated robot of `handsteer run`), virtual, "
+        "browser (of the device that shows the page), a webcam's index or /dev/videoN, an address (rtsp, http), a "
+        "video file or a folder of photos",
     )
     width: int = Field(
         640, ge=64, le=4096, description="Width requested from a webcam, or of the virtual hand's picture [px]"

@@ -68,7 +68,7 @@ document.addEventListener("keyup", (event) => {
 }, true);
 
 // data-lost on the root: the server does not answer, so what is shown may be old; "refused" if this page has no access.
-const LOOK_MS = 500, OWN_ADDRESS = document.currentScript.src;
+const CONNECTION_LOOK_MS = 500, OWN_ADDRESS = document.currentScript.src;
 let wasConnected = false;
 setInterval(async () => {
   const data = document.documentElement.dataset, connected = window.socket?.connected ?? false;
@@ -78,7 +78,7 @@ setInterval(async () => {
   data.lost = "";
   const answer = await fetch(OWN_ADDRESS, { cache: "no-store", signal: AbortSignal.timeout(PATIENCE_MS) }).catch(() => null);
   if (answer?.status === 401) data.lost = "refused";
-}, LOOK_MS);
+}, CONNECTION_LOOK_MS);
 
 document.addEventListener("click", (event) => {
   if (!event.target.closest?.(".theme")) return;

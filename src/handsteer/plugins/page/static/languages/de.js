@@ -1077,7 +1077,7 @@ const WORDS = {
   "Before obstacles": "Vor Hindernissen",
 
   // Parameters: camera
-  "auto, virtual, browser (of the device that shows the page), a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.": "auto, virtual, browser (des Geräts, das die Seite zeigt), die Nummer einer Webcam oder /dev/videoN, eine Adresse (rtsp, http), eine Videodatei oder ein Ordner mit Fotos.",
+  "auto (a webcam, else the virtual hand for the simulated robot of `handsteer run`), virtual, browser (of the device that shows the page), a webcam's index or /dev/videoN, an address (rtsp, http), a video file or a folder of photos.": "auto (eine Webcam, sonst die virtuelle Hand für den simulierten Roboter von `handsteer run`), virtual, browser (des Geräts, das die Seite zeigt), die Nummer einer Webcam oder /dev/videoN, eine Adresse (rtsp, http), eine Videodatei oder ein Ordner mit Fotos.",
   "Width requested from a webcam, or of the virtual hand's picture.": "Breite, die von einer Webcam verlangt wird, oder die des Bilds der virtuellen Hand.",
   "Height requested from a webcam, or of the virtual hand's picture.": "Höhe, die von einer Webcam verlangt wird, oder die des Bilds der virtuellen Hand.",
   "Fps": "Bildrate",
