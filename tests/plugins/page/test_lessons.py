@@ -245,6 +245,14 @@ def test_after_the_last_sign_is_deleted_the_model_is_gone_too(taught: School) ->
     assert not node.state.is_changed
 
 
+def test_a_model_of_signs_that_were_never_among_the_takes_is_not_deleted(school: School) -> None:
+    save_custom_model(model(), school.folder / "mine.npz")
+    school.lessons.begin("ann")
+    school.lessons.save("ann", {})
+    assert "mine.npz" in school.files
+    assert ann(school).state.model is not None
+
+
 def test_what_another_program_has_added_is_not_lost_when_a_lesson_is_continued(school: School) -> None:
     path = school.folder / "signs.npz"
     save_dataset(Dataset(tuple(takes("Hi", "Peace", count=2))), path)

@@ -157,8 +157,9 @@ class Lessons:
             if _version(path) != current.read:
                 raise DatasetError(f"{path} was changed by another program: end the lesson, and begin another")
             message = KEPT_TAKES
-            if not labels and state.model is not None:
-                self._forget_model(state)
+            had = {one.label for one in state.kept}
+            if state.model is not None and not labels and had.issuperset(state.model.labels):
+                self._forget_model(had)
                 current.node.do(Lesson.forget_model)
                 message = KEPT
             elif state.model is not None and (state.is_fresh or state.learnt_from is None):
@@ -167,18 +168,17 @@ class Lessons:
                         raise ConfigError(f"choose first what the robot does at {label}")
                 if state.is_fresh:
                     save_custom_model(state.model, self.model_path.expanduser())
-                removed = {one.label for one in state.kept} - {*labels, *state.model.labels}
+                removed = had - {*labels, *state.model.labels}
                 self._graph.reconfigure(with_signs(self._graph.config, self.model_path, effects, removed))
                 message = KEPT_TAKES if state.lost else KEPT
             save_dataset(dataset, path)
             current.read = _version(path)
             current.node.do(lambda lesson: lesson.mark_kept(message))
 
-    def _forget_model(self, state: LessonState) -> None:
-        """Delete the model of signs that are all deleted, and let the graph use none."""
-        removed = {one.label for one in state.kept}
-        path, config = self.model_path.expanduser(), self._graph.config
-        self._graph.reconfigure(with_signs(config, None, {}, removed))
+    def _forget_model(self, removed: Iterable[str]) -> None:
+        """Delete the model, all of whose signs are ``removed``, and let the graph use none."""
+        path = self.model_path.expanduser()
+        self._graph.reconfigure(with_signs(self._graph.config, None, {}, removed))
         path.unlink(missing_ok=True)
 
     def share(self, viewer: str, path: Path) -> bool:
