@@ -24,8 +24,6 @@ log = logging.getLogger(__name__)
 _RECORDED = "recorded-file"
 _MATRICES = {"camera_matrix": 9, "rectification_matrix": 9, "projection_matrix": 12}
 _WHOLE = RegionOfInterest(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
-
-
 _NO_WEBCAM = (
     "no webcam delivers a picture: connect one, or name another camera, such as an address, or browser with handsteer "
     "run. Where the robot may be real, the virtual hand, which drives without a person, has to be named too: virtual"
@@ -45,11 +43,12 @@ def open_camera(config: Config, clock: Clock, *, may_be_real: bool = False) -> C
     source = config.camera.source
     if source == "auto":
         webcam = _first_webcam(config.camera, clock)
-        if webcam is None and may_be_real:
+        if webcam is not None:
+            return webcam
+        if may_be_real:
             raise CameraNotFound(_NO_WEBCAM)
-        if webcam is None:
-            log.info("no webcam delivers a picture: using the virtual hand")
-        return webcam or doors.CAMERAS.open(_VIRTUAL.source, config, clock)
+        log.info("no webcam delivers a picture: using the virtual hand")
+        return doors.CAMERAS.open(_VIRTUAL.source, config, clock)
     if source == "browser":
         raise CameraNotFound("the browser's camera needs the page: handsteer run --camera browser")
     if source in doors.CAMERAS.names():

@@ -168,24 +168,15 @@ class CollisionMonitor:
         if self._freezes(received.message):
             return
         points = points_of(received.message, self._limiter.rule)
-        if (points is None) != self._is_broken:
-            self._is_broken = points is None
-            (log.warning if self._is_broken else log.info)(
-                "laser scans %s", "have no valid range" if self._is_broken else "are valid again"
-            )
+        self._is_broken = _logged(self._is_broken, points is None, "have no valid range", "are valid again")
         if points is not None and not self._mixes(received.message, now):
             captured_s = now if received.captured_s is None else received.captured_s
             self._limiter.see(points, min(captured_s, now))
 
     def _mixes(self, scan: LaserScan, now_s: float) -> bool:
         """Return whether scans cover different angles in turn; then nothing is known of what is in the way."""
-        is_mixed = self._mixed.note(scan, now_s)
-        if is_mixed != self._is_mixed:
-            self._is_mixed = is_mixed
-            (log.warning if is_mixed else log.info)(
-                "laser scans %s",
-                "of several scanners or sectors come on one topic" if is_mixed else "are of one scanner",
-            )
+        is_mixed, begins = self._mixed.note(scan, now_s), "of several scanners or sectors come on one topic"
+        self._is_mixed = _logged(self._is_mixed, is_mixed, begins, "are of one scanner")
         if is_mixed:
             self._limiter.forget()
         return is_mixed
@@ -194,11 +185,7 @@ class CollisionMonitor:
         """Return whether scans are frozen; then nothing is known of what is in the way, until one differs."""
         is_same, is_frozen = self._frozen.note(scan, self._limiter.rule)
         is_frozen = is_frozen or (self._is_frozen and is_same)
-        if is_frozen != self._is_frozen:
-            self._is_frozen = is_frozen
-            (log.warning if is_frozen else log.info)(
-                "laser scans %s", "do not change while the robot moves" if is_frozen else "change again"
-            )
+        self._is_frozen = _logged(self._is_frozen, is_frozen, "do not change while the robot moves", "change again")
         if is_frozen:
             self._limiter.forget()
         return is_frozen
@@ -211,6 +198,13 @@ class CollisionMonitor:
             now = self._node.clock.now()
             captured_s = now if received.captured_s is None else received.captured_s
             self._limiter.feel(moving, min(captured_s, now))
+
+
+def _logged(before: bool, now: bool, begins: str, ends: str) -> bool:
+    """Return ``now``, whether something is wrong with the scans; log in words when that begins and ends."""
+    if now != before:
+        (log.warning if now else log.info)("laser scans %s", begins if now else ends)
+    return now
 
 
 def _beside(wanted: Velocity, allowed: Velocity) -> str:

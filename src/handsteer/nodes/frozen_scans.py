@@ -10,8 +10,6 @@ from handsteer.messages import NO_STAMP, LaserScan, Pose
 _MOVED_M, _TURNED_RAD = 0.1, 0.1
 # Walls that are parallel to a straight way look the same all along it; at this angle and distance nothing can be one.
 _AHEAD_RAD, _NEAR_M = math.radians(5), 4.0
-
-
 _MIXED_S = 2.0
 # Some scanners turn a little more or less for each scan.
 _SAME_RAD = 0.2
@@ -25,7 +23,7 @@ class MixedScans:
         self._changed_s = -math.inf
 
     def note(self, scan: LaserScan, now_s: float) -> bool:
-        """Return whether the frame or the angles of the scans have changed in the last two seconds."""
+        """Return whether the frame or the angles of the scans have changed in the 2 s before ``now_s``."""
         before, last_rad = self._covered, scan.angle_min + scan.angle_increment * (len(scan.ranges) - 1)
         frame, lowest, highest = scan.header.frame_id, min(scan.angle_min, last_rad), max(scan.angle_min, last_rad)
         self._covered = frame, lowest, highest

@@ -46,7 +46,7 @@ class Ros1Transport(BaseTransport):
     Args:
         clock: The graph's clock.
         topics: New names of topics, by their full default names. Remapping overrides it.
-        was_stopped: Whether subscribers of ``/stopped`` are first told of a Stop.
+        was_stopped: Whether a Stop is in force from before: subscribers of ``/stopped`` receive it first.
     """
 
     # TCP loses no part of a large image, and the course's cameras publish raw ones only.
@@ -84,7 +84,7 @@ class Ros1Transport(BaseTransport):
 
     @property
     def is_stopped(self) -> bool:
-        """Whether this process has published last on ``/stopped`` that the robot is stopped, or was told so."""
+        """Whether a Stop is in force: by the last message of this process on ``/stopped``, else from before."""
         name = self.topic_name(STOPPED)
         with self._lock:
             mine = [each for each in self._publishers if isinstance(each, _Ros1Publisher) and each.name == name]

@@ -230,8 +230,8 @@ class Ros2Transport(BaseTransport):
 
 def types_of(topic: Topic[Any]) -> set[str]:
     """Return the names of the types that ``topic`` may have: a command is a Twist or a TwistStamped."""
-    kinds = {topic.type, topic.or_type or topic.type}
-    return {type_name(kind) for kind in (kinds | {Twist, TwistStamped} if kinds & {Twist, TwistStamped} else kinds)}
+    kinds, commands = {topic.type, topic.or_type or topic.type}, {Twist, TwistStamped}
+    return {type_name(kind) for kind in (kinds | commands if kinds & commands else kinds)}
 
 
 class Other(NamedTuple):

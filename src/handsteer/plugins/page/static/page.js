@@ -55,8 +55,9 @@ document.addEventListener("click", (event) => {
 
 // Anywhere except where a space can be typed; a focused button would otherwise take the space key as a click.
 // On-screen keyboards and remote desktops send keys without a code.
-const isSpace = (event) => event.code === "Space" || event.key === " ";
-window.isSpace = isSpace;
+function isSpace(event) {
+  return event.code === "Space" || event.key === " ";
+}
 const TAKES_SPACE = "input:not([type=number], [inputmode=decimal], [type=color], [readonly]), textarea:not([readonly]), [contenteditable]";
 document.addEventListener("keydown", (event) => {
   if (!isSpace(event) || event.target.closest?.(TAKES_SPACE)) return;

@@ -137,7 +137,7 @@ function followKeys(pad) {
   else releasePad();
 }
 
-document.addEventListener("keydown", (event) => window.isSpace(event) && letGo(), true);
+document.addEventListener("keydown", (event) => isSpace(event) && letGo(), true);
 document.addEventListener("pointerdown", (event) => event.target.closest?.(".banner .stop") && letGo(), true);
 // When a phone is turned, the pad moves, and the finger on it would command something else.
 window.addEventListener("resize", () => {
