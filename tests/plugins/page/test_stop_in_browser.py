@@ -13,11 +13,12 @@ from handsteer.graph import Graph
 from handsteer.messages import STOP
 from tests.plugins.page.browsers import a_browser
 from tests.plugins.page.served import page_process
+from tests.plugins.page.test_layout_in_browser import CUT
 from tests.plugins.page.test_sticks_in_browser import PLUG_IN, phone
 from tests.plugins.page.visits import (
     NEEDS_A_BROWSER,
     PATIENCE_MS,
-    WINDOW,
+    PHONE,
     Visit,
     each_when_there_is_time,
     visiting,
@@ -218,7 +219,7 @@ def test_a_page_that_is_left_open_over_a_restart_says_that_it_knows_nothing() ->
     dashboard = {"port": free_port(), "token": "always"}
     with Graph(load(None, QUIET, {"dashboard": dashboard})) as graph, a_browser() as browser:
         served = page_process()
-        page = browser.new_page(viewport=WINDOW, locale="en-US")
+        page = browser.new_page(viewport=PHONE, locale="de-DE")
         page.set_default_timeout(PATIENCE_MS)
         page.goto(served.serve(graph))
         graph.start()
@@ -227,10 +228,12 @@ def test_a_page_that_is_left_open_over_a_restart_says_that_it_knows_nothing() ->
         assert page.locator(".banner .lost:visible").count() == 0
         served.stop()
         page.locator(".lost.again:visible").wait_for()
+        assert not page.locator(".banner .words").evaluate(CUT)
         assert not page.locator(".banner .headline").is_visible()
         served = page_process()
         served.serve(graph)
         page.locator(".lost.elsewhere:visible").wait_for()
+        assert not page.locator(".banner .words").evaluate(CUT)
         page.locator(".banner .stop").click()
         page.wait_for_function("document.documentElement.dataset.stop === 'refused'")
         assert page.locator(".stop .refused").is_visible()
