@@ -4,8 +4,10 @@ All timing uses :meth:`Clock.now`, which is monotonic. :meth:`Clock.stamp` conve
 ``builtin_interfaces/Time`` of message headers, and :meth:`Clock.time_of` converts it back.
 """
 
+import functools
 import logging
 import math
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -28,6 +30,23 @@ _LEAST_SET_S = 1.0
 _RESTART_S = 1.0
 
 log = logging.getLogger(__name__)
+
+
+def _clock_that_runs_in_sleep() -> Callable[[], float]:
+    kind = getattr(time, "CLOCK_MONOTONIC" if sys.platform == "darwin" else "CLOCK_BOOTTIME", None)
+    try:
+        if kind is not None and time.clock_gettime(kind) > 0.0:
+            return functools.partial(time.clock_gettime, kind)
+    except OSError:  # an old or an emulated kernel
+        pass
+    return time.monotonic
+
+
+monotonic = _clock_that_runs_in_sleep()
+"""Return monotonic seconds that include those in which the machine sleeps.
+
+``time.monotonic()`` stops for these on Linux and macOS, so that whatever is as old as a night would count as new.
+"""
 
 
 class Clock(Protocol):
@@ -65,11 +84,11 @@ class RealClock:
     """
 
     def __init__(self) -> None:
-        self._epoch_offset_s = time.time() - time.monotonic()
+        self._epoch_offset_s = time.time() - monotonic()
 
     def now(self) -> float:
-        """Return ``time.monotonic()`` in seconds."""
-        return time.monotonic()
+        """Return :func:`monotonic`, in seconds."""
+        return monotonic()
 
     def stamp(self, time_s: float) -> "Time":
         """Return Unix time for the monotonic ``time_s``."""
@@ -98,7 +117,7 @@ class WallClock(RealClock):
     @property
     def offset_s(self) -> float:
         """Unix time minus monotonic time at this moment, in seconds."""
-        return time.time() - time.monotonic()
+        return time.time() - monotonic()
 
 
 class SteppedClock:
@@ -150,7 +169,7 @@ class SimulatedClock:
         real: Returns real, monotonic seconds.
     """
 
-    def __init__(self, real: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, real: Callable[[], float] = monotonic) -> None:
         self._real = real
         self._lock = threading.Lock()
         self._told_s = 0.0

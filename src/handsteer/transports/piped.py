@@ -18,7 +18,6 @@ import pickle
 import struct
 import sys
 import threading
-import time
 import weakref
 from collections import deque
 from collections.abc import Callable, Hashable
@@ -26,6 +25,7 @@ from typing import IO, Any, Final, TypeVar
 
 from pydantic import BaseModel
 
+from handsteer.clock import monotonic
 from handsteer.errors import HandsteerError, TransportError, quoted
 from handsteer.messages import CompressedImage, Image, Topic
 from handsteer.transports.base import Deliver, Publisher, Received, Subscription, Transport
@@ -203,7 +203,7 @@ class Pipe:
         self._sink.flush()
 
     def _leave_out(self, kind: str, verb: str, error: Exception) -> None:
-        now_s = time.monotonic()
+        now_s = monotonic()
         if now_s - self._logged_s.get((kind, verb), -math.inf) >= _LOG_PERIOD_S:
             self._logged_s[kind, verb] = now_s
             reason = f"{type(error).__name__} {quoted(str(error))}"
@@ -264,7 +264,7 @@ class _PipedPublisher(BasePublisher[M]):
     def _send(self, message: M, captured_s: float | None) -> None:
         if self._end.alive:
             # All processes of a machine share one monotonic clock.
-            sent = (self._number, Received(message, captured_s), time.monotonic())
+            sent = (self._number, Received(message, captured_s), monotonic())
             self._pipe.say("publish", *sent, key=self._number, keep=kept(self.topic))
 
     def close(self) -> None:
@@ -304,7 +304,7 @@ class Gateway:
         publisher, topic = self._publishers.get(number, (None, None))
         if publisher is None or topic is None:
             return
-        if topic.lifespan_s is None or time.monotonic() - sent_s <= topic.lifespan_s:
+        if topic.lifespan_s is None or monotonic() - sent_s <= topic.lifespan_s:
             publisher.publish(received.message, received.captured_s)
 
     def _subscribe(self, number: int, node: str, topic: Topic[Any]) -> None:

@@ -1,11 +1,11 @@
 """The card for manual steering: pad, gamepad, tilt, sliders, active input, and topic."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from nicegui import ui
 
+from handsteer.clock import monotonic
 from handsteer.errors import TransportError
 from handsteer.messages import STEERING_CMD_VEL
 from handsteer.plugins.page.elements import box, button, card, read_words, set_property, switch, text
@@ -110,7 +110,7 @@ class SteerPanel:
     def update(self, state: PageState, lease: LeaseStatus) -> None:
         """Show ``state`` to a viewer with ``lease``; sliders of others, and of a stopped robot, are at 0."""
         self._mux.update(state)
-        self._input.end_if_silent(time.monotonic())
+        self._input.end_if_silent(monotonic())
         can_steer = lease.role != "watcher" and not state.stopped
         if not can_steer:
             self._input.sliders = ZERO
@@ -134,11 +134,11 @@ class SteerPanel:
     def _hold_pad(self, sent: object) -> None:
         x, y = read_deflection(sent)
         wanted = Velocity(y * self._top_mps, -x * self._top_mps * _TURN_PER_SPEED)
-        self._steer(self._input.hold_pad(wanted, _sent_ms(sent), time.monotonic()))
+        self._steer(self._input.hold_pad(wanted, _sent_ms(sent), monotonic()))
 
     def _keep_sliders(self, sent: object) -> None:
         touched = sent.get("touched") if isinstance(sent, dict) else None
-        for wanted in self._input.keep_sliders(_sent_ms(sent), touched, time.monotonic()):
+        for wanted in self._input.keep_sliders(_sent_ms(sent), touched, monotonic()):
             self._steer(wanted)
         self._show_sliders()
 
@@ -149,7 +149,7 @@ class SteerPanel:
         if wanted.is_zero:
             self.release()
         else:
-            self._input.slide(wanted, time.monotonic())
+            self._input.slide(wanted, monotonic())
             self._show_sliders()
 
     def _steer(self, wanted: Velocity | None) -> None:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
-from handsteer.clock import Clock
+from handsteer.clock import Clock, monotonic
 from handsteer.errors import TransportError
 from handsteer.messages import (
     CameraInfo,
@@ -410,7 +410,7 @@ class Intake(Generic[M]):
     def _is_late(self, sender: bytes, sent_s: float | None) -> bool:
         if self._stale is None or sent_s is None:
             return False
-        is_late = self._stale.is_late(sender, sent_s, time.monotonic())
+        is_late = self._stale.is_late(sender, sent_s, monotonic())
         if is_late and not self._was_late:
             log.warning(
                 "%s: messages come over %g s late and are not obeyed, but for stops: has the link stood still, has the "
