@@ -524,6 +524,25 @@ def test_the_old_robot_is_told_to_stand_and_the_new_one_moves_after_stop_only() 
     assert bench.told["r3"][-1].linear.x == pytest.approx(0.01)
 
 
+def test_while_it_is_deactivated_a_selection_commands_nothing() -> None:
+    bench = FleetBench()
+    bench.show("Forward", 5)
+    bench.choose("r2")
+    bench.control.set_active(False)
+    sent = {name: len(told) for name, told in bench.told.items()}
+    assert bench.told["r1"][-1] == twist(0.0, 0.0)
+    bench.choose("r3")
+    bench.run(0.2)
+    assert bench.selected[-1].data == "r3"
+    assert {name: len(told) for name, told in bench.told.items()} == sent
+    bench.control.set_active(True)
+    bench.run(0.2)
+    assert {name: len(told) for name, told in bench.told.items() if name != "r3"} == {
+        "r1": sent["r1"],
+        "r2": sent["r2"],
+    }
+
+
 def test_a_sign_that_is_held_selects_the_next_robot_once() -> None:
     bench = FleetBench()
     bench.show("Peace", 30)

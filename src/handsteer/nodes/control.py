@@ -189,6 +189,9 @@ class HandSignControlNode(Node):
     def on_deactivate(self) -> None:
         """Stop the robot; from then on nothing is commanded."""
         self._publish(self._control.halt())
+        if self._selection:
+            self._selection.beat()
+            self._selection.forget()
         self._look_for_changes(self.clock.now())
 
     def on_stop(self) -> None:

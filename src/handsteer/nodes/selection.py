@@ -46,6 +46,7 @@ class Selection:
         on_change: Callable[[], None],
     ) -> None:
         self.robot = names[0]
+        self._node = node
         self._names = names
         topics = {name: replace(cmd_vel, name=f"/{name}{cmd_vel.name}") for name in names}
         self.topics = tuple(topics.values())
@@ -69,14 +70,15 @@ class Selection:
     def select(self, name: str) -> None:
         """Select the robot ``name``, or the following one for :data:`NEXT`; an unknown name changes nothing.
 
-        The previous one gets a zero first, and more from :meth:`beat`.
+        The previous one gets a zero first, and more from :meth:`beat`, unless the control is inactive.
         """
         if name == NEXT:
             name = self._names[(self._names.index(self.robot) + 1) % len(self._names)]
         if name not in self._names:
             log.warning("there is no robot %s to select; there are %s", quoted(name), ", ".join(self._names))
         elif name != self.robot:
-            self._left[self.robot] = _LAST_ZEROS
+            if self._node.is_active:
+                self._left[self.robot] = _LAST_ZEROS
             self._left.pop(name, None)
             self.robot = name
             self.beat()
@@ -90,6 +92,10 @@ class Selection:
             self._left[name] -= 1
             if not self._left[name]:
                 del self._left[name]
+
+    def forget(self) -> None:
+        """Send nothing more to robots that were selected a moment ago."""
+        self._left.clear()
 
     def _on_select(self, received: Received[String]) -> None:
         self.select(received.message.data.strip())

@@ -314,12 +314,22 @@ def test_steering_past_the_control_is_said_whatever_the_control_says() -> None:
         assert compose(observed(*statuses), 0.1, halted).stopped
 
 
-def test_a_stop_is_said_once_the_control_obeys_it_or_when_there_is_no_control() -> None:
+def test_a_stop_is_said_once_the_control_obeys_it() -> None:
     halted = Viewers(stopped="you", stands=True)
     assert not compose(observed(control(Reason("sign", "Forward"), linear=0.1)), 0.1, halted).stopped
     assert compose(observed(STOPPED), 0.1, halted).stopped
-    assert compose(Observed(), 0.1, halted).headline == "Stopped"
     assert compose(Observed(), 0.1).headline == "Waiting"
+
+
+def test_a_stop_of_which_no_control_reports_is_not_said_to_have_stopped_the_robot() -> None:
+    halted = Viewers(stopped="you", stands=True)
+    state = compose(Observed(), 0.1, halted)
+    assert (state.mood, state.headline) == ("trouble", "Trouble")
+    assert "the robot may still drive" in state.reason
+    assert state.stopped, "it can be reset"
+    assert state.unheard
+    assert Notable.of(state).news_since(Notable.of(compose(Observed(), 0.1))) is None
+    assert not compose(observed(STOPPED), 0.1, halted).unheard
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ COMMAND_HOLDS_S = ROBOT_S
 
 _LASTING_S: Final = 1.0
 _WITHOUT_FRAMES: Final = "connect the camera again, or choose another"
+_UNHEARD: Final = "Stop is sent, but the node hand_sign_control does not report: the robot may still drive"
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class PageState:
         no_picture: Why there are no pictures; empty if there are.
         camera: Short name of the camera.
         stopped: Whether the robot is stopped until reset.
+        unheard: Whether Stop was pressed, and no control reports whether the robot obeys it.
         commanded: The commanded velocity, zero without a command.
         measured: The velocity from odometry.
         fps: Frame rate of the camera in Hz; None if unknown.
@@ -60,6 +62,7 @@ class PageState:
     no_picture: str
     camera: str
     stopped: bool
+    unheard: bool
     commanded: Velocity
     measured: Velocity
     fps: float | None
@@ -98,6 +101,7 @@ def compose(observed: Observed, now_s: float, viewers: Viewers = NO_VIEWERS) -> 
         no_picture=why_no_picture(reporting),
         camera=reporting.camera.short_name if reporting.camera else "",
         stopped=stopped,
+        unheard=is_unheard(reporting.control, viewers),
         commanded=observed.command if now_s - observed.command_came_s < COMMAND_HOLDS_S else ZERO,
         measured=observed.measured,
         fps=frame_rate(observed.frame_counts, now_s),
@@ -128,6 +132,11 @@ def is_stopped(control: ControlStatus | None, viewers: Viewers) -> bool:
     return is_reported or (viewers.stands and (control is None or bool(viewers.topic)))
 
 
+def is_unheard(control: ControlStatus | None, viewers: Viewers) -> bool:
+    """Return whether Stop was pressed, and no control reports whether the robot obeys it, as where the link is cut."""
+    return viewers.stands and control is None and not viewers.topic
+
+
 def confirmed(recognition: RecognitionStatus) -> float:
     """Return the progress of confirming the sign that ``recognition`` reports, 0 to 1."""
     if recognition.seen in (None, NONE):
@@ -152,8 +161,8 @@ def explain(reporting: Reporting, viewers: Viewers = NO_VIEWERS, *, is_moving: b
         return by_hand
     control, robot = reporting.control, reporting.robot or RobotStatus()
     stopped = is_stopped(control, viewers)
-    if control is None and not stopped:
-        return "waiting", "Waiting", "the node hand_sign_control does not report"
+    if control is None and (not stopped or is_unheard(control, viewers)):
+        return _explain_silence(stopped=stopped)
     if robot.level >= ERROR:
         return "trouble", "Trouble", f"the robot {robot.message}"
     if control is None or stopped:
@@ -171,6 +180,12 @@ def explain(reporting: Reporting, viewers: Viewers = NO_VIEWERS, *, is_moving: b
     # What lies upstream is why it stands, whatever the control waits for.
     state = control.reason.state() if control.reason and not upstream else "standing"
     return mood, "Stopping" if is_moving else state.capitalize(), upstream or reason
+
+
+def _explain_silence(*, stopped: bool) -> tuple[Mood, str, str]:
+    if stopped:
+        return "trouble", "Trouble", _UNHEARD
+    return "waiting", "Waiting", "the node hand_sign_control does not report"
 
 
 def _explain_steering(reporting: Reporting, viewers: Viewers, *, is_moving: bool) -> tuple[Mood, str, str] | None:

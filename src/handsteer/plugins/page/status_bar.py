@@ -100,7 +100,7 @@ class Notable:
     """What the driver must notice while looking at the robot.
 
     Attributes:
-        stopped: Whether the robot is stopped until reset.
+        stopped: Whether the robot is stopped until reset, as far as is known.
         ready: Whether signs are obeyed.
         sign: The sign that is obeyed, or ``NONE``.
     """
@@ -113,7 +113,7 @@ class Notable:
     def of(cls, state: PageState) -> "Notable":
         """Return what is notable in ``state``."""
         ready = not state.stopped and state.control.armed and state.control.engaged
-        return cls(state.stopped, ready, state.recognition.sign if ready else NONE)
+        return cls(state.stopped and not state.unheard, ready, state.recognition.sign if ready else NONE)
 
     def news_since(self, before: "Notable") -> tuple[str, str] | None:
         """Return the tone and the words for what has changed, the most important only; None if nothing has."""
@@ -194,6 +194,7 @@ class Banner:
         self._spoken.set_text(spoken(state))
         switch(self._warning, "hidden", on=not state.warnings)
         switch(self._reset, "hidden", on=not state.stopped)
+        switch(self._banner, "unheard", on=state.unheard)
         if state.mood != self._mood:
             self._banner.classes(remove=self._mood, add=state.mood)
             self._mood = state.mood

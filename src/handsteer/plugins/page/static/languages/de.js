@@ -160,6 +160,7 @@ const WORDS = {
   "no sign has set it in motion yet": "noch kein Zeichen hat ihn in Bewegung gesetzt",
   "gives no reason": "nennt keinen Grund",
   "the node hand_sign_control does not report": "der Node hand_sign_control meldet sich nicht",
+  "Stop is sent, but the node hand_sign_control does not report: the robot may still drive": "Stopp ist gesendet, aber der Node hand_sign_control meldet sich nicht: der Roboter fährt vielleicht noch",
   "the node hand_sign_recognition does not report": "der Node hand_sign_recognition meldet sich nicht",
   "no report yet": "noch keine Meldung",
   "no laser scan has come for # s, so what is in the way is not known": "seit # s kam kein Laserscan, was im Weg ist, ist also unbekannt",
