@@ -1,16 +1,18 @@
 from dataclasses import replace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 from handsteer.cameras import VIRTUAL_HAND, choose
 from handsteer.clock import SteppedClock
 from handsteer.config import Config
-from handsteer.errors import CameraNotFound
+from handsteer.errors import CameraNotFound, HandsteerError
 from handsteer.graph import Graph
 from handsteer.making import make_camera, make_control, open_robot
 from handsteer.messages import CMD_VEL, HAND_SIGN, String, Topic
 from handsteer.nodes.control import HandSignControlNode
+from handsteer.testing.faulty_camera import FaultyCamera
 from handsteer.transports.in_process import InProcessTransport
 from tests.nodes.stepping import Bench
 
@@ -84,6 +86,35 @@ def test_the_courses_robot_may_be_in_the_namespace_of_its_control() -> None:
 def no_webcam(monkeypatch: pytest.MonkeyPatch) -> Config:
     monkeypatch.setattr(choose, "webcams", lambda: [])
     return Config.model_validate({"camera": {"source": "auto", "width": 320, "height": 240}})
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"signs": {"model": "/nowhere.npz"}}, {"camera": {"source": "/nowhere.mp4"}}, {"signs": {"profile": "no"}}],
+)
+def test_a_graph_that_cannot_start_closes_its_robot(wrong: dict[str, Any]) -> None:
+    robot, closed = open_robot(Config(), SteppedClock()), []
+    robot.close = lambda: closed.append(robot)  # type: ignore[method-assign]
+    with pytest.raises(HandsteerError):
+        Graph(Config.model_validate(wrong), SteppedClock(), robot=robot)
+    assert closed == [robot]
+
+
+def test_a_graph_that_cannot_start_closes_its_camera() -> None:
+    camera = FaultyCamera([], SteppedClock())
+    config = Config.model_validate({"camera": {"calibration": "/nowhere.yaml"}})
+    with pytest.raises(HandsteerError):
+        Graph(config, SteppedClock(), camera=camera)
+    assert camera.closed
+
+
+def test_a_robot_that_fails_at_the_start_is_closed() -> None:
+    robot, closed = open_robot(Config(), SteppedClock()), []
+    robot.close = lambda: closed.append(robot)  # type: ignore[method-assign]
+    robot.step = Mock(side_effect=OSError)  # type: ignore[method-assign]
+    with pytest.raises(OSError):
+        Graph(Config(), SteppedClock(), robot=robot)
+    assert closed == [robot]
 
 
 def test_without_a_webcam_the_virtual_hand_drives_the_simulated_robot(no_webcam: Config) -> None:

@@ -123,12 +123,26 @@ def test_one_long_pause_is_a_fault_though_an_image_comes_at_its_end() -> None:
     assert set(person.shows("Forward", 1.0)) == {ZERO}
 
 
-@pytest.mark.parametrize("dt_s", [-0.1, math.nan, math.inf])
-def test_a_time_that_cannot_be_stops_the_robot(dt_s: float) -> None:
+@pytest.mark.parametrize("dt_s", [-0.1, math.nan, math.inf, None, "0.03", 10**400, np.zeros(2)], ids=type)
+def test_a_time_that_cannot_be_stops_the_robot(dt_s: Any) -> None:
     person = Person()
     person.drives()
     assert person.teleop.step(person.image("Forward"), dt_s) == ZERO
     assert set(person.shows("Forward", 1.0)) == {ZERO}
+
+
+@pytest.mark.parametrize("sign", ["Forward", "Go", "Turn Left"])
+@pytest.mark.parametrize("ramp", ["per_message", "per_second"])
+@pytest.mark.parametrize("failed", [Velocity(math.nan, math.nan), Velocity(0.1, math.nan), Velocity(-math.inf, 0.0)])
+def test_a_velocity_that_is_not_finite_holds_back_to_zero(failed: Velocity, ramp: str, sign: str) -> None:
+    person = Person(Config.model_validate({"control": {"engage_by": "hold", "ramp": ramp}}))
+    person.drives()
+    if sign == "Turn Left":
+        person.shows(sign, 1.0)
+    person.teleop.hold_back(failed)
+    velocity = person.teleop.step(person.image(sign), DT_S)
+    assert 0.0 <= velocity.linear_mps < 0.1
+    assert 0.0 <= velocity.angular_radps < 0.5
 
 
 @pytest.mark.parametrize(

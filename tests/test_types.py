@@ -1,3 +1,5 @@
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -106,3 +108,10 @@ def test_names_of_signs_may_be_written_in_other_ways() -> None:
     assert action_of("Thumbs Up", {"thumbs_up": "turbo"}) == "turbo"
     assert "Thumbs Up" in motion_signs({"thumbs_up": "turbo"}, ["Thumbs Up", "Peace"])
     assert "Peace" not in motion_signs({"thumbs_up": "turbo"}, ["Thumbs Up", "Peace"])
+
+
+def test_what_is_not_a_number_is_limited_to_zero() -> None:
+    assert Velocity(math.nan, 0.5).clamped(1.0, 2.0) == Velocity(0.0, 0.5)
+    assert Velocity(0.5, math.nan).clamped(1.0, 2.0) == Velocity(0.5, 0.0)
+    assert Velocity(0.5, 0.5).clamped(math.nan, 2.0) == Velocity(0.0, 0.5)
+    assert Velocity(math.inf, -math.inf).clamped(1.0, 2.0) == Velocity(1.0, -2.0)

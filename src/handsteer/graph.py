@@ -17,6 +17,7 @@ import logging
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -111,34 +112,38 @@ class Graph:
         cmd_vel = cmd_vel_topic(config)
         journals = tuple(Journal(*wires) for _ in range(2))
         noted = tuple((journal.transport, journal.clock) for journal in journals)
-        self.robot = make_robot(config, *wires, link, robot, cmd_vel=cmd_vel, odom=ODOM, scan=SCAN)
-        self.recognition = make_recognition(
-            config,
-            *noted[0],
-            recognizer,
-            image=IMAGE_RAW,
-            compressed=IMAGE_COMPRESSED,
-            sign=HAND_SIGN,
-            joy=GESTURE_JOY,
-            camera_changed=CAMERA_CHANGED,
-        )
         simulated = robot is None and config.robot.kind == "sim"
-        self.cameras = open_cameras(config, self.clock, camera, may_be_real=not simulated)
-        self.cameras.on_change = self._tell_of_camera
-        self._camera_changed = self.transport.advertise("my_camera", CAMERA_CHANGED)
-        self.camera = make_camera(config, *wires, self.cameras, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED)
-        self.control = make_control(
-            config,
-            *noted[1],
-            simulated=simulated,
-            sign=HAND_SIGN,
-            joy=GESTURE_JOY,
-            camera_changed=CAMERA_CHANGED,
-            steering=STEERING_CMD_VEL,
-            cmd_vel=cmd_vel,
-            odom=ODOM,
-            scan=SCAN,
-        )
+        with ExitStack() as opened:
+            self.robot = make_robot(config, *wires, link, robot, cmd_vel=cmd_vel, odom=ODOM, scan=SCAN)
+            opened.callback(self.robot.on_stop)
+            self.recognition = make_recognition(
+                config,
+                *noted[0],
+                recognizer,
+                image=IMAGE_RAW,
+                compressed=IMAGE_COMPRESSED,
+                sign=HAND_SIGN,
+                joy=GESTURE_JOY,
+                camera_changed=CAMERA_CHANGED,
+            )
+            self.cameras = open_cameras(config, self.clock, camera, may_be_real=not simulated)
+            opened.callback(self.cameras.close)
+            self.cameras.on_change = self._tell_of_camera
+            self._camera_changed = self.transport.advertise("my_camera", CAMERA_CHANGED)
+            self.camera = make_camera(config, *wires, self.cameras, image=IMAGE_RAW, compressed=IMAGE_COMPRESSED)
+            self.control = make_control(
+                config,
+                *noted[1],
+                simulated=simulated,
+                sign=HAND_SIGN,
+                joy=GESTURE_JOY,
+                camera_changed=CAMERA_CHANGED,
+                steering=STEERING_CMD_VEL,
+                cmd_vel=cmd_vel,
+                odom=ODOM,
+                scan=SCAN,
+            )
+            opened.pop_all()  # from here on, stop() closes them
         self._steering = make_steering(config, *wires, steering=STEERING_CMD_VEL, cmd_vel=cmd_vel) if steering else None
         self._added: tuple[Node, ...] = ()
         self.recognition.journal, self.control.journal = journals

@@ -160,7 +160,11 @@ def make_robot(
         clock = WallClock()
     topics = {"cmd_vel": cmd_vel_topic(config), **topics}
     robot = robot or open_robot(config, clock, link, topics["cmd_vel"])
-    return RobotNode(transport, clock, robot, prefixed(config.robot, transport), **topics)
+    try:
+        return RobotNode(transport, clock, robot, prefixed(config.robot, transport), **topics)
+    except BaseException:
+        robot.close()
+        raise
 
 
 def open_robot(config: Config, clock: Clock, link: Session | None = None, cmd_vel: Topic[Any] = CMD_VEL) -> "Robot":

@@ -11,6 +11,7 @@ and :class:`~handsteer.nodes.control.HandSignControlNode` the same control.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +75,7 @@ class Teleop:
         Raises:
             FrameError: The image has another shape or type; the robot is stopped.
         """
-        if not (math.isfinite(dt_s) and dt_s >= 0):
+        if not _is_duration(dt_s):
             self._refused = f"the time between two images is {dt_s} s"
             return self._fault(self._refused)
         self._command(self._control.step(dt_s))  # the sign timeout applies before the new image counts
@@ -91,7 +92,10 @@ class Teleop:
         return self._velocity
 
     def hold_back(self, velocity: Velocity) -> None:
-        """Continue from ``velocity``: the slower one that was commanded instead of what :meth:`step` returned."""
+        """Continue from ``velocity``: the slower one that was commanded instead of what :meth:`step` returned.
+
+        From zero, if it is not finite.
+        """
         self._control.hold_back(velocity)
 
     def stop(self) -> None:
@@ -147,3 +151,10 @@ class Teleop:
     def _command(self, velocity: Velocity | None) -> None:
         if velocity is not None:
             self._velocity = velocity
+
+
+def _is_duration(value: Any) -> bool:
+    try:
+        return math.isfinite(value) and value >= 0
+    except (TypeError, OverflowError):
+        return False

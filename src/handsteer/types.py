@@ -153,11 +153,13 @@ class Velocity:
         return math.isfinite(self.linear_mps) and math.isfinite(self.angular_radps)
 
     def clamped(self, max_linear_mps: float, max_angular_radps: float) -> "Velocity":
-        """Return the nearest velocity within the limits."""
-        return Velocity(
-            max(-max_linear_mps, min(self.linear_mps, max_linear_mps)),
-            max(-max_angular_radps, min(self.angular_radps, max_angular_radps)),
-        )
+        """Return the nearest velocity within the limits; 0 for a part that, or whose limit, is not a number."""
+        return Velocity(_clamped(self.linear_mps, max_linear_mps), _clamped(self.angular_radps, max_angular_radps))
+
+
+def _clamped(value: float, most: float) -> float:
+    # min and max of a number that is none return the other one: full speed backward.
+    return 0.0 if math.isnan(value) or math.isnan(most) else max(-most, min(value, most))
 
 
 ZERO = Velocity()

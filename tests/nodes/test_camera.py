@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from handsteer.cameras.choose import uncalibrated
-from handsteer.clock import to_seconds
+from handsteer.clock import SteppedClock, to_seconds
 from handsteer.config import Config
 from handsteer.errors import CameraLost
 from handsteer.images import bgr_image
@@ -123,6 +123,30 @@ def test_a_lost_camera_is_tried_again_with_growing_pauses(caplog: pytest.LogCapt
     assert "trying again in 2 s" in caplog.text
     assert "faulty camera is back" in caplog.text
     assert node.callback_errors == 0
+
+
+def test_a_camera_that_fails_in_a_way_of_its_own_is_tried_again_with_pauses_too(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    bench, node, _ = start(ONE, OSError("no such port"), OSError("no such port"), TWO, THREE)
+    images, diagnostics = bench.record(IMAGE_RAW), bench.record(DIAGNOSTICS)
+    bench.run(1.0)
+    status = diagnostics[-1].status[0]
+    assert (len(images), status.message) == (1, "faulty camera has failed: OSError: no such port")
+    bench.run(2.0)
+    assert len(images) == 3
+    assert caplog.text.count("Traceback") == 1
+    assert node.callback_errors == 0
+
+
+def test_a_camera_that_returns_no_frame_at_once_is_not_asked_without_pause() -> None:
+    bench, camera = Bench(), FaultyCamera([None] * 1000 + [ONE], SteppedClock())
+    camera.period_s = None  # type: ignore[assignment]
+    bench.nodes = [node := CameraNode(bench.transport, bench.clock, camera)]
+    bench.run(1.0)
+    assert node.frames == 0
+    bench.run(10.0)
+    assert node.frames == 1
 
 
 def test_a_file_that_ends_says_so_and_the_camera_is_released_at_the_end() -> None:

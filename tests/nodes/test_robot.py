@@ -54,6 +54,20 @@ class RobotBench(Bench):
         return self.odometry[-1]
 
 
+def test_a_robot_that_fails_at_its_last_zero_is_closed_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench()
+    robot, closed = open_robot(Config(robot=RobotConfig(world="empty")), bench.clock), []
+    node = RobotNode(bench.transport, bench.clock, robot, RobotConfig(world="empty"))
+
+    def fail(*_: float) -> None:
+        raise OSError("the port does not answer")
+
+    monkeypatch.setattr(robot, "command", fail)
+    monkeypatch.setattr(robot, "close", lambda: closed.append(robot))
+    node.stop()
+    assert closed == [robot]
+
+
 def test_it_tells_the_time_only_when_asked() -> None:
     silent, asked = RobotBench(), RobotBench(publish_clock=True)
     for bench in (silent, asked):

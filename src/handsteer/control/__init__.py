@@ -184,7 +184,8 @@ class Control:
         return stopped if velocity is None else velocity
 
     def hold_back(self, velocity: Velocity) -> None:
-        """Continue from ``velocity``, a slower one that was commanded instead of the last."""
+        """Continue from ``velocity``, a slower one that was commanded instead of the last; from zero if not finite."""
+        velocity = velocity if velocity.is_finite else ZERO
         self.mux.hold_back(velocity)
         self._ramp.hold_back(velocity)
 

@@ -8,7 +8,7 @@ from handsteer.cameras.choose import uncalibrated
 from handsteer.cameras.freshness import Freshness
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.errors import CameraError
+from handsteer.errors import CameraError, CameraLost
 from handsteer.images import camera_jpeg_message, image_message, jpeg_message
 from handsteer.messages import (
     CAMERA_INFO,
@@ -28,6 +28,9 @@ from handsteer.transports.base import Transport
 
 _DIAGNOSE_PERIOD_S = 0.5
 _SILENT_AFTER_S = 1.0
+_NO_FRAME_S = 0.005
+"""Pause after a camera that sets the pace has returned no frame: it may return at once."""
+
 _FIRST_RETRY_S = 0.5
 _LONGEST_RETRY_S = 8.0
 _COMPARED_ROWS = 30
@@ -108,9 +111,15 @@ class CameraNode(Node):
             self._reading.delay_until(self.clock.now() + _LONGEST_RETRY_S)
         except CameraError as error:
             self._lose(error)
+        except Exception as error:  # of a plug-in
+            if self._retry_s == _FIRST_RETRY_S:
+                log.exception("%s has failed", self._camera.name)
+            self._lose(CameraLost(f"{self._camera.name} has failed: {type(error).__name__}: {error}"))
         else:
             self._follow_choice()
-            if frame is not None and self._is_new(frame):
+            if frame is None and not self.is_paced:
+                self._reading.delay_until(self.clock.now() + _NO_FRAME_S)
+            elif frame is not None and self._is_new(frame):
                 self._publish(frame)
 
     def _follow_choice(self) -> None:

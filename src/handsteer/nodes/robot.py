@@ -145,9 +145,11 @@ class RobotNode(Node):
         return self._surroundings.services()
 
     def on_stop(self) -> None:
-        """Stop the robot."""
-        self._robot.command(0.0, 0.0)
-        self._robot.close()
+        """Stop the robot, and close it even if it fails at that."""
+        try:
+            self._robot.command(0.0, 0.0)
+        finally:
+            self._robot.close()
 
     def _on_command(self, received: Received[Twist | TwistStamped]) -> None:
         now = self.clock.now()

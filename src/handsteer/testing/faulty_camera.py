@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from handsteer.cameras import Camera, EndOfStream, Frame
 from handsteer.clock import Clock
-from handsteer.errors import CameraError, CameraLost
+from handsteer.errors import CameraLost
 
-Event = NDArray[np.uint8] | CameraError | None
+Event = NDArray[np.uint8] | Exception | None
 CameraFault = Literal["black", "frozen", "torn", "slow", "stuttering", "silent", "vanishing", "in_the_future", "late"]
 
 CAMERA_FAULTS: tuple[CameraFault, ...] = get_args(CameraFault)
@@ -41,7 +41,7 @@ class FaultyCamera:
     def read(self) -> Frame | None:
         """Return or raise the next event."""
         for event in self._events:
-            if isinstance(event, CameraError):
+            if isinstance(event, Exception):
                 raise event
             return None if event is None else Frame(event, self._clock.now() - self._age_s)
         raise EndOfStream
