@@ -75,6 +75,14 @@ class StaleMessageFilter:
             sent_s: Time of sending, in seconds of any clock of the sender.
             arrived_s: Time of arrival, in seconds of a local monotonic clock.
         """
+        delay_s = self.delay_s(sender, sent_s, arrived_s)
+        return delay_s is None or delay_s > self._limit_s
+
+    def delay_s(self, sender: bytes, sent_s: float, arrived_s: float) -> float | None:
+        """Return by how much a message took longer than the sender's quickest; None if that is not known now.
+
+        The arguments are those of :meth:`is_late`; call one of the two for each message.
+        """
         by_stamp_s = arrived_s - sent_s
         least_s, noted_s, watch = self._least.pop(sender, (by_stamp_s, arrived_s, ClockWatch(in_step=False)))
         apart_s = watch.corrected(by_stamp_s, arrived_s)
@@ -83,7 +91,32 @@ class StaleMessageFilter:
         self._least[sender] = (least_s, arrived_s, watch)
         if len(self._least) > _SENDERS:
             self._least.popitem(last=False)
-        return apart_s is None or apart_s - least_s > self._limit_s
+        return None if apart_s is None else apart_s - least_s
+
+
+class StopOrder:
+    """Detects a reset that was sent before the Stop that it would end: a cut link has held it back.
+
+    The times of sending are compared by when messages without delay would have arrived.
+    """
+
+    def __init__(self) -> None:
+        self._delays = StaleMessageFilter(0.0)
+        self._stopped_by, self._stopped_s = b"", -math.inf
+
+    def is_overtaken(self, sender: bytes, sent_s: float, arrived_s: float, *, stops: bool) -> bool:
+        """Return whether a message must not end the Stop; False for one that stops.
+
+        Args:
+            sender: Identifies the sender, whose own messages arrive in order.
+            sent_s: Time of sending, in seconds of any clock of the sender.
+            arrived_s: Time of arrival, in seconds of a local monotonic clock.
+            stops: Whether the message stops the robot.
+        """
+        prompt_s = arrived_s - (self._delays.delay_s(sender, sent_s, arrived_s) or 0.0)
+        if stops and prompt_s > self._stopped_s:
+            self._stopped_by, self._stopped_s = sender, prompt_s
+        return not stops and sender != self._stopped_by and prompt_s < self._stopped_s
 
 
 class ClockMonitor:

@@ -7,6 +7,7 @@ import pytest
 from handsteer.clock import RealClock
 from handsteer.images import image_message
 from handsteer.messages import IMAGE_RAW, STEERING_CMD_VEL, STOP, Bool, Header, Topic, twist
+from handsteer.plugins.ros2 import base_transport
 from handsteer.plugins.ros2.base_transport import Intake, Once, Players
 from handsteer.transports.base import Received
 from handsteer.transports.encoding import encode
@@ -32,6 +33,24 @@ def test_of_late_messages_only_those_that_stop_are_sent_on_and_marked() -> None:
 def test_a_stop_is_sent_on_however_late() -> None:
     heard = taken(STOP, (Bool(data=False), 0.0), (Bool(data=True), 0.9))
     assert [each.message.data for each in heard] == [False, True]
+
+
+def test_a_reset_that_was_held_back_does_not_end_a_newer_stop_of_another(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where the link to the page was cut when *Reset* was pressed there, and then Stop on the robot's side."""
+    heard: list[Received[Any]] = []
+    intake = Intake(STOP, "/stop", RealClock(), heard.append)
+    for is_stopped, sender, sent_s, arrived_s in (
+        (True, b"page", 0.0, 0.0),
+        (True, b"robot", 2.0, 2.0),
+        (False, b"page", 1.0, 5.0),
+        (False, b"page", 6.0, 6.0),
+    ):
+        monkeypatch.setattr(base_transport, "monotonic", lambda arrived_s=arrived_s: arrived_s)
+        intake.take(encode(Bool(data=is_stopped)), sender, sent_s)
+    assert [each.message.data for each in heard] == [True, True, False]
+    assert caplog.text.count("sent before the last Stop") == 1
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ from handsteer.timeouts import STALE_S
 from handsteer.transports.base import Deliver, Received
 from handsteer.transports.encoding import NodeName, compile_type, decode, encode
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
-from handsteer.transports.timing import StaleMessageFilter, capture_time
+from handsteer.transports.timing import StaleMessageFilter, StopOrder, capture_time
 
 M = TypeVar("M")
 
@@ -379,6 +379,7 @@ class Intake(Generic[M]):
         self._clock = clock
         self._send = send
         self._stale = None if topic.lifespan_s is None else StaleMessageFilter(topic.lifespan_s)
+        self._order = StopOrder() if topic.stops is not None and topic.lifespan_s is None else None
         self._was_late = self._is_broken = False
 
     def take(self, raw: bytes, sender: bytes, sent_s: float | None) -> None:
@@ -398,7 +399,10 @@ class Intake(Generic[M]):
                 log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
             self._is_broken = True
             return
-        if not is_late or (self._topic.stops is not None and self._topic.stops(message)):
+        stops = self._topic.stops is not None and self._topic.stops(message)
+        if self._is_overtaken(sender, sent_s, stops=stops):
+            return
+        if not is_late or stops:
             captured_s = capture_time(message, self._clock)
             is_played = False
             if captured_s is not None and self._players is not None:
@@ -406,6 +410,14 @@ class Intake(Generic[M]):
                 # Old stamps that advance would otherwise look like those of a camera whose clock was set.
                 is_late = self._players.are_among_others() and self._clock.now() - captured_s > STALE_S
             self._send(Received(message, captured_s, is_late=is_late, by_player=is_played))
+
+    def _is_overtaken(self, sender: bytes, sent_s: float | None, *, stops: bool) -> bool:
+        if self._order is None or sent_s is None or not sender:
+            return False
+        is_overtaken = self._order.is_overtaken(sender, sent_s, monotonic(), stops=stops)
+        if is_overtaken:
+            log.warning("%s: a reset that was sent before the last Stop is not obeyed: reset again", self._name)
+        return is_overtaken
 
     def _is_late(self, sender: bytes, sent_s: float | None) -> bool:
         if self._stale is None or sent_s is None:
