@@ -195,9 +195,27 @@ def test_never_writes_over_what_somebody_else_wrote(bench: Bench) -> None:
     with pytest.raises(ConfigError, match=r"my.yaml was changed by another program"):
         bench.settings.save()
     assert bench.path.read_text() == "camera: {fps: 11}\n"
+
+
+@pytest.mark.parametrize("text", [None, "control: {max_linear: 0.5}\n"], ids=["saved before", "read at the start"])
+def test_a_file_that_was_deleted_is_written_again(tmp_path: Path, text: str | None) -> None:
+    bench = Bench(tmp_path, text=text)
+    bench.set("camera.fps", "12")
+    bench.settings.save()
+    before = load(bench.path)
     bench.path.unlink()
+    assert bench.settings.save() == "saved to my.yaml"
+    assert load(bench.path) == before == bench.settings.wanted
+    bench.path.write_text("camera: {fps: 11}\n")
     with pytest.raises(ConfigError, match=r"my.yaml was changed by another program"):
         bench.settings.save()
+
+
+def test_values_that_are_kept_in_a_file_that_was_deleted_are_known(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, text="control: {max_linear: 0.5}\n")
+    bench.path.unlink()
+    bench.settings.keep({MODEL: tmp_path / "mine.npz"})
+    assert bench.settings.save() == "saved to my.yaml", "it knows what it has written"
 
 
 def test_a_file_that_cannot_be_used_changes_nothing(bench: Bench) -> None:

@@ -268,7 +268,8 @@ class SettingsFile:
     @property
     def is_current(self) -> bool:
         """Whether nothing in the file is unknown: it is as it was read or saved, or does not exist."""
-        return self._content() == self._known
+        content = self._content()
+        return content is None or content == self._known
 
     def load(self) -> Config:
         """Return the parameters in the file, with defaults for the rest.
@@ -290,7 +291,7 @@ class SettingsFile:
             ConfigError: The file has changed since it was read, or cannot be written.
         """
         old = self._content()
-        if old != self._known:
+        if old is not None and old != self._known:
             happened = "was changed by another program" if self._known is not None else "exists, and was not read"
             raise ConfigError(f"{self.path.name} {happened}: load it first, which brings back what it says")
         new = yaml.safe_dump(_in_order_of(old, values), sort_keys=False, allow_unicode=True) if values else ""
