@@ -3,6 +3,8 @@
 import asyncio
 import contextlib
 import http.client
+import os
+import re
 import resource
 import socket
 import ssl
@@ -12,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from handsteer.config import DashboardConfig
+from handsteer.errors import DashboardError
 from handsteer.plugins.page import limits
 from tests.plugins.page.served import PATIENCE_S, Site
 from tests.plugins.page.sockets import PageSocket
@@ -90,6 +94,25 @@ def test_a_handshake_of_https_that_does_not_come_is_not_waited_for(tmp_path: Pat
             assert connection.getresponse().status == 200
     finally:
         site.close()
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("what", ["pipe", "device", "large file", "missing file"])
+@pytest.mark.parametrize("field", ["certificate", "private_key"])
+def test_a_certificate_and_its_key_are_regular_files_of_limited_size(tmp_path: Path, field: str, what: str) -> None:
+    path, regular = tmp_path / "given.pem", tmp_path / "certificate.pem"
+    regular.write_text("not looked at before both files are known to be regular ones")
+    if what == "pipe":
+        os.mkfifo(path)
+    elif what == "device":
+        path.symlink_to("/dev/zero")
+    elif what == "large file":
+        with path.open("wb") as file:
+            file.truncate(5_000_000_000)  # takes no space
+    reason = {"large file": "it is larger than 1 MB", "missing file": "No such file"}.get(what, "it is a device or a")
+    said = re.escape(f"the {field.replace('_', ' ')} {path} cannot be used for https: {reason}")
+    with pytest.raises(DashboardError, match=f"^{said}"):
+        limits.load_certificate(DashboardConfig(**{"certificate": regular, field: path}))
 
 
 class Line(asyncio.Transport):

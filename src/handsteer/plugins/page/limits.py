@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final, cast
 
 from nicegui import Client
@@ -21,6 +22,7 @@ from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from handsteer.config import DashboardConfig
 from handsteer.errors import DashboardError
+from handsteer.regular_files import open_regular
 
 MOST_UNKNOWN: Final = 128
 MOST_OF_ONE_ADDRESS: Final = 32
@@ -249,16 +251,23 @@ def limit_log() -> None:
         logging.getLogger(name).addFilter(limit)
 
 
+_LARGEST_PEM_BYTES: Final = 1_000_000
+"""Size of a certificate's file, or of a key's; a chain of certificates has some 10 kB."""
+
+
 def load_certificate(config: DashboardConfig) -> ssl.SSLContext | None:
     """Return what https needs; None without a certificate.
 
     Raises:
-        DashboardError: It cannot be used.
+        DashboardError: The certificate or its key cannot be used, is not a regular file, or is larger than 1 MB.
     """
     if config.certificate is None:
         if config.private_key is not None:
             raise DashboardError("dashboard.private_key is of no use without dashboard.certificate: give both")
         return None
+    _check_file("certificate", config.certificate)
+    if config.private_key is not None:
+        _check_file("private key", config.private_key)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     try:
         context.load_cert_chain(config.certificate, config.private_key)
@@ -266,3 +275,11 @@ def load_certificate(config: DashboardConfig) -> ssl.SSLContext | None:
         reason = error.strerror or error
         raise DashboardError(f"the certificate {config.certificate} cannot be used for https: {reason}") from None
     return context
+
+
+def _check_file(what: str, path: Path) -> None:
+    try:
+        # ssl opens files by their paths only: it would wait at a pipe for a writer, and read any size.
+        open_regular(path, _LARGEST_PEM_BYTES).close()
+    except OSError as error:
+        raise DashboardError(f"the {what} {path} cannot be used for https: {error.strerror}") from None
