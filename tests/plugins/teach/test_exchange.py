@@ -133,6 +133,22 @@ def test_packed_files_are_read(tmp_path: Path) -> None:
     assert len(read_keypoints(tmp_path / "key.csv.gz", {"0": "Hi"}, "Ann")) == 1
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".csv.gz"])
+def test_a_byte_order_mark_does_not_hide_the_first_row(tmp_path: Path, suffix: str) -> None:
+    """Spreadsheets write one as the begin of a CSV file in UTF-8."""
+    path = tmp_path / f"key{suffix}"
+    content = f"{row(0)}\n{row(1)}\n".encode("utf-8-sig")
+    path.write_bytes(gzip.compress(content) if suffix == ".csv.gz" else content)
+    assert [take.label for take in read_keypoints(path, {"0": "Hi", "1": "Ho"}, "Ann")] == ["Hi", "Ho"]
+
+
+def test_each_class_can_be_required_to_have_a_row(tmp_path: Path) -> None:
+    path, labels = written(tmp_path / "key.csv", row(1)), {"0": "Hi", "1": "Ho", "7": "Ho"}
+    assert [take.label for take in read_keypoints(path, labels, "Ann")] == ["Ho"]
+    with pytest.raises(DatasetError, match=r"key\.csv: there is no row of class 0, 7$"):
+        read_keypoints(path, labels, "Ann", needs_all=True)
+
+
 def test_the_rows_that_others_share_are_read(data_dir: Path) -> None:
     found = read_keypoints(data_dir / "keypoints" / "kinivi.csv.gz", {"3": "OK"}, "kinivi")
     assert sum(len(take.hands) for take in found) == 337

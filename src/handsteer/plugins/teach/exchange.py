@@ -107,7 +107,9 @@ def _line(cells: list[object]) -> str:
     return line.getvalue()
 
 
-def read_keypoints(path: Path, labels: Mapping[str, str], person: str, *, mirrored: bool = True) -> list[Take]:
+def read_keypoints(
+    path: Path, labels: Mapping[str, str], person: str, *, mirrored: bool = True, needs_all: bool = False
+) -> list[Take]:
     """Return the takes in a file of keypoints, which may be compressed with gzip (``.gz``).
 
     Such files do not mark takes: up to 100 consecutive rows of one class form one.
@@ -117,20 +119,23 @@ def read_keypoints(path: Path, labels: Mapping[str, str], person: str, *, mirror
         labels: The sign of each class; rows of other classes are left out.
         person: The person who showed them.
         mirrored: Whether the rows come from mirrored images, as is usual.
+        needs_all: Whether each of these classes must have a row; otherwise, one of them must.
 
     Raises:
         DatasetError: The file cannot be read, a row in it is wrong, or there is no row of these classes.
     """
     session = path.name.split(".")[0]
-    takes = [
-        Take(labels[number], person, session, path.name, hands, (0.0,) * len(hands))
+    found = [
+        (number, Take(labels[number], person, session, path.name, hands, (0.0,) * len(hands)))
         for number, group in itertools.groupby(_rows(path, mirrored=mirrored), key=lambda row: row[0])
         if number in labels
         for hands in _parts(hand for _, hand in group)
     ]
-    if not takes:
-        raise DatasetError(f"{path}: there is no row of class {', '.join(labels)}")
-    return takes
+    present = {number for number, _ in found}
+    missing = [number for number in labels if number not in present]
+    if missing and (needs_all or not found):
+        raise DatasetError(f"{path}: there is no row of class {', '.join(missing)}")
+    return [take for _, take in found]
 
 
 def read_class_names(path: Path) -> dict[str, str]:
@@ -167,7 +172,7 @@ def _rows(path: Path, *, mirrored: bool) -> Iterator[tuple[str, Hand]]:
 
 def _lines_of(content: BinaryIO, suffix: str) -> TextIO:
     plain = gzip.GzipFile(fileobj=content) if suffix == ".gz" else content
-    return io.TextIOWrapper(cast(BinaryIO, plain), newline="")
+    return io.TextIOWrapper(cast(BinaryIO, plain), "utf-8-sig", newline="")
 
 
 def _lines(file: TextIO, path: Path) -> Iterator[str]:

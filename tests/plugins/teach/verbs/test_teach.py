@@ -112,6 +112,19 @@ def test_rows_of_others_are_imported(capsys: pytest.CaptureFixture[str]) -> None
 
 
 @pytest.mark.parametrize(
+    ("label", "message"),
+    [
+        ("zero=P", "--labels: 'zero=P' should be the number of a class and its sign, each once, as 3=OK"),
+        ("7=P", "key.csv: there is no row of class 7"),
+    ],
+)
+def test_a_label_that_no_row_has_is_refused(capsys: pytest.CaptureFixture[str], label: str, message: str) -> None:
+    written(Path("key.csv"), row(1))
+    assert message in fails(capsys, "signs", "import", "key.csv", "--labels", label, "1=Q")
+    assert not Path("signs.npz").exists()
+
+
+@pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["collect"], "--label is missing: name the sign, as in --label Hi"),

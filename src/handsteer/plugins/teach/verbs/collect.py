@@ -1,5 +1,6 @@
 """``handsteer signs collect`` and ``import``: examples of a sign to be learnt."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +10,9 @@ from cyclopts import Parameter
 from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
 from handsteer.cli.running import check_writable, settings
 from handsteer.errors import DatasetError
+
+# Some tables have all numbers with decimals.
+_NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?")
 
 
 @Parameter(name="*")
@@ -154,7 +158,8 @@ def import_keypoints(
     source
         CSV file, or gzipped (.csv.gz).
     labels
-        The sign of each class, as 3=OK; other classes are skipped. Or a file with one name per line, from class 0.
+        The sign of each class, as 3=OK; other classes are skipped, and each of these needs a row. Or a file
+        with one name per line, from class 0; classes without a row are skipped.
     dataset
         File to add the rows to; created if missing.
     person
@@ -163,27 +168,27 @@ def import_keypoints(
         The rows come from unmirrored images; most such projects mirror them first.
     """
     from handsteer.plugins.teach.dataset import Dataset, add_takes, load_dataset
-    from handsteer.plugins.teach.exchange import read_keypoints
+    from handsteer.plugins.teach.exchange import read_class_names, read_keypoints
     from handsteer.plugins.teach.verbs.tables import dataset_table
     from handsteer.recognition.custom_signs import label_for
 
     check_writable("--dataset", dataset, DatasetError)
     known = load_dataset(dataset) if dataset.exists() else Dataset()
-    names = {number: label_for(name, known.labels) for number, name in _names(labels).items()}
-    takes = read_keypoints(source, names, person or source.name.split(".")[0], mirrored=not not_mirrored)
+    listed = len(labels) == 1 and "=" not in labels[0]
+    given = read_class_names(Path(labels[0])) if listed else _names(labels)
+    names = {number: label_for(name, known.labels) for number, name in given.items()}
+    person = person or source.name.split(".")[0]
+    # A file lists all classes of a project, some without rows here; what is typed is meant.
+    takes = read_keypoints(source, names, person, mirrored=not not_mirrored, needs_all=not listed)
     print(dataset_table(add_takes(takes, dataset)))
     return 0
 
 
 def _names(labels: list[str]) -> dict[str, str]:
-    if len(labels) == 1 and "=" not in labels[0]:
-        from handsteer.plugins.teach.exchange import read_class_names
-
-        return read_class_names(Path(labels[0]))
     names: dict[str, str] = {}
     for pair in labels:
         number, equals, name = pair.partition("=")
-        if not equals or not number.strip() or not name.strip() or number.strip() in names:
+        if not equals or not _NUMBER.fullmatch(number.strip()) or not name.strip() or number.strip() in names:
             raise DatasetError(f"--labels: {pair!r} should be the number of a class and its sign, each once, as 3=OK")
         names[number.strip()] = name.strip()
     return names
