@@ -59,6 +59,8 @@ def test_an_empty_file_is_the_defaults(tmp_path: Path) -> None:
         ("control: {actions: {Stop: go}}", r"control.actions: {'Stop': 'go'} should leave Stop at 'stop'"),
         ("control: {actions: {none: turbo}}", r"control.actions: {'none': 'turbo'} should leave NONE at 'stop'"),
         ("control: {actions: {Go: stop, GO: go}}", r"control.actions: .*should name each sign once; 'GO' does not"),
+        ("control: {actions: {Caf\u00e9: stop, Cafe\u0301: go}}", r"control.actions: .*should name each sign once"),
+        ("control: {actions: {\uff33\uff54\uff4f\uff50: go}}", r"control.actions: .*should leave Stop at 'stop'"),
         ("control: {actions: {' ': go}}", r"control.actions: .*should name each sign once"),
         ("- 1", r"expected sections such as 'control:' at the top, found list"),
         ("control: {", r"line 1: not valid YAML"),

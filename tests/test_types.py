@@ -20,6 +20,7 @@ from handsteer.types import (
     ZERO,
     Velocity,
     action_of,
+    find_sign,
     motion_signs,
 )
 from tests.about import about
@@ -34,6 +35,21 @@ def config(**values: object) -> ControlConfig:
 def test_without_a_table_the_motion_signs_are_the_built_in_ones() -> None:
     assert motion_signs({}) == MOTION_SIGNS
     assert motion_signs({"Peace": "turbo", "Hi": "stop", FORWARD: "go"}) == MOTION_SIGNS - {FORWARD} | {"Peace"}
+
+
+@pytest.mark.parametrize(
+    ("name", "sign"),
+    [
+        ("turn_right", "Turn Right"),
+        ("TurnRight", "Turn Right"),
+        ("\uff33\uff54\uff4f\uff50", STOP),
+        ("turn\u3000right", "Turn Right"),
+        ("Caf\u00e9", "Cafe\u0301"),
+        ("CAFE", None),
+    ],
+)
+def test_a_name_means_a_sign_whatever_its_case_spaces_and_unicode_form(name: str, sign: str | None) -> None:
+    assert find_sign(name, (*SIGNS, "Cafe\u0301")) == sign
 
 
 def test_every_action_is_described() -> None:

@@ -7,6 +7,7 @@ positive; metres, radians, seconds.
 """
 
 import math
+import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
@@ -41,15 +42,16 @@ MOTION_SIGNS = frozenset({FORWARD, BACKWARD, TURN_RIGHT, TURN_LEFT})
 
 
 def find_sign(name: str, known: Iterable[str]) -> str | None:
-    """Return the sign of ``known`` that ``name`` means, ignoring case, spaces, ``_`` and ``-``; None if there is none.
+    """Return the sign of ``known`` that ``name`` means; None if there is none.
 
-    So ``TurnRight``, ``turn_right`` and ``turn right`` all mean ``Turn Right``.
+    Case, spaces, ``_`` and ``-`` are ignored: ``TurnRight``, ``turn_right`` and ``turn right`` all mean ``Turn Right``.
+    So are Unicode forms: an accent may be part of its letter or follow it, and letters may have full width.
     """
     return next((sign for sign in known if _bare(sign) == _bare(name)), None)
 
 
 def _bare(name: str) -> str:
-    return "".join(letter for letter in name.casefold() if letter not in " _-\t")
+    return "".join(letter for letter in unicodedata.normalize("NFKC", name).casefold() if letter not in " _-\t")
 
 
 def describe_seen(sign: str, seen: str, *, is_hand_in_view: bool) -> str:

@@ -122,6 +122,12 @@ def test_a_damaged_file_is_refused(tmp_path: Path, arrays: dict[str, np.ndarray 
         load_custom_model(changed(tmp_path / "odd.npz", **arrays))
 
 
+def test_labels_that_were_stored_in_other_unicode_forms_are_loaded(tmp_path: Path) -> None:
+    """Earlier versions took them for signs of their own."""
+    old = ("Caf\u00e9", "Cafe\u0301")
+    assert load_custom_model(changed(tmp_path / "old.npz", taught=np.array(old))).labels == old
+
+
 def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelMissing, match=r"gone\.npz"):
         load_custom_model(tmp_path / "gone.npz")

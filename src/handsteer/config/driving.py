@@ -206,7 +206,7 @@ class ControlConfig(Section):
         named: dict[str, Action] = {}
         for name, action in actions.items():
             sign = find_sign(name, BUILT_IN) or name.strip()
-            if not sign or sign in named:
+            if not sign or find_sign(sign, named) is not None:
                 raise ValueError(f"should name each sign once; {name!r} does not")
             if sign in ALWAYS_STOP and action != "stop":
                 raise ValueError(f"should leave {sign} at 'stop', so that the robot can always be stopped")

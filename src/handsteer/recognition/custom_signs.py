@@ -2,6 +2,7 @@
 
 import json
 import math
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -155,17 +156,28 @@ class CustomClassifier:
 
 
 def label_for(name: str, known: Sequence[str] = ()) -> str:
-    """Return the label for ``name``: a sign of handsteer, one of ``known``, or a new one.
+    """Return the label for ``name``: a sign of handsteer, one of ``known``, or a new one, in Unicode's form NFC.
 
     Raises:
         DatasetError: It is empty, too long, or not printable.
     """
-    name = " ".join(name.split())
-    if not name or not name.isprintable() or len(name) > _LONGEST_NAME:
+    name = unicodedata.normalize("NFC", " ".join(name.split()))
+    if not _is_name(name):
         raise DatasetError(
             f"{name[:60]!r} is not a valid name for a sign: give 1 to {_LONGEST_NAME} printable characters, as 'Hi'"
         )
     return find_sign(name, (*SIGNS, NONE, *known)) or name
+
+
+def is_label(text: str) -> bool:
+    """Return whether ``text`` is a label that this version or an earlier one has stored."""
+    # Earlier versions stored names in any Unicode form, and took those of full width for signs of their own.
+    is_own = find_sign(text, (*SIGNS, NONE)) in (None, text) or not unicodedata.is_normalized("NFKC", text)
+    return is_own and _is_name(text) and text == " ".join(text.split())
+
+
+def _is_name(text: str) -> bool:
+    return 1 <= len(text) <= _LONGEST_NAME and text.isprintable()
 
 
 def save_custom_model(model: CustomModel, path: Path) -> None:
@@ -215,6 +227,6 @@ def model_from(arrays: Arrays) -> CustomModel:
         raise ValueError("its parts do not fit together")
     if not ((thresholds > 0) & (thresholds < 1)).all():
         raise ValueError("a threshold is not between 0 and 1")
-    if len(set(labels)) < count or {*SIGNS, NONE} & set(labels) or any(label_for(each) != each for each in labels):
+    if len(set(labels)) < count or {*SIGNS, NONE} & set(labels) or not all(map(is_label, labels)):
         raise ValueError("its signs are not named as taught signs are")
     return CustomModel(labels, depth, network, novelty, thresholds, dict(json.loads(str(arrays["trained_on"]))))

@@ -187,6 +187,15 @@ def test_what_is_no_name_is_refused(lesson: Lesson, name: str, problem: str) -> 
     assert labels(lesson) == ["Peace", "Other", NONE]
 
 
+def test_a_name_in_another_unicode_form_is_no_other_sign(lesson: Lesson) -> None:
+    lesson.add_class("Cafe\u0301")
+    with pytest.raises(DatasetError, match="there is a sign Caf\u00e9 already"):
+        lesson.add_class("Caf\u00e9")
+    with pytest.raises(DatasetError, match="Stop is known already"):
+        lesson.add_class("\uff33\uff54\uff4f\uff50")
+    assert labels(lesson) == ["Peace", "Caf\u00e9", NONE]
+
+
 def test_nothing_changes_while_it_is_learnt_from(lesson: Lesson) -> None:
     assert lesson.begin_training() is None, "there is no take"
     classes = recorded(lesson).state.classes

@@ -70,6 +70,28 @@ def test_a_name_means_a_sign_that_is_known(name: str, label: str) -> None:
     assert label_for(name, ["Hello"]) == label
 
 
+def test_a_name_has_one_unicode_form_and_is_that_of_a_known_sign_in_any() -> None:
+    assert label_for("Cafe\u0301") == "Caf\u00e9"
+    assert label_for("Caf\u00e9", ["Cafe\u0301"]) == "Cafe\u0301"
+    assert label_for("e\u0301" * 40) == "\u00e9" * 40
+    assert label_for("\uff33\uff54\uff4f\uff50") == "Stop"
+
+
+def test_labels_that_were_stored_in_other_unicode_forms_are_loaded(tmp_path: Path) -> None:
+    """Earlier versions took them for signs of their own."""
+    old = ("Cafe\u0301", "\uff33\uff54\uff4f\uff50")
+    save_dataset(Dataset(tuple(take(label, "Peace", hands=2) for label in old), frozenset(old)), tmp_path / "old.npz")
+    assert load_dataset(tmp_path / "old.npz").labels == old
+    assert load_dataset(tmp_path / "old.npz").disabled == set(old)
+
+
+@pytest.mark.parametrize("label", ["turn left", "STOP", "a  b", " a", "a\u00a0b"])
+def test_labels_that_no_version_has_stored_are_refused(tmp_path: Path, label: str) -> None:
+    save_dataset(Dataset((take(label, "Peace", hands=2),)), tmp_path / "odd.npz")
+    with pytest.raises(DatasetError, match="take 0 has the label"):
+        load_dataset(tmp_path / "odd.npz")
+
+
 @pytest.mark.parametrize("name", ["", "  ", "x" * 41, "a\x07b"])
 def test_a_name_that_cannot_be_printed_is_refused(name: str) -> None:
     with pytest.raises(DatasetError, match="not a valid name for a sign"):

@@ -121,9 +121,17 @@ def test_landmarks_without_depth_are_learnt_from_the_image_and_sides_are_kept() 
             "too little data for Hi: 2 takes with 8 hands; at least 2 takes with 10 hands",
         ),
         (Dataset((*takes("Hi", "Peace", count=2), *takes("hi", "Call", count=2))), "'Hi' and 'hi' mean the same"),
+        (
+            Dataset((take("Caf\u00e9", "Peace", hands=2), take("Cafe\u0301", "Call", hands=2))),
+            "'Caf\u00e9' and 'Cafe\u0301' mean the same",
+        ),
+        (
+            Dataset((take("\uff33\uff54\uff4f\uff50", "Peace", hands=2),)),
+            "'Stop' and '\uff33\uff54\uff4f\uff50' mean the same",
+        ),
         (Dataset(tuple(takes("Hi", "Stop", count=2))), r"Hi looks like Stop: \d+% of its hands are recognised as that"),
     ],
-    ids=["nothing", "no new one", "one take", "few hands", "same name", "shipped"],
+    ids=["nothing", "no new one", "one take", "few hands", "same name", "accents", "full width", "shipped"],
 )
 def test_what_cannot_be_learnt_is_refused_with_a_reason(data: Dataset, message: str) -> None:
     with pytest.raises(TrainingError, match=message):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.errors import DatasetError
-from handsteer.recognition.custom_signs import label_for
+from handsteer.recognition.custom_signs import is_label
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.npz import Arrays, NpzFormat
 
@@ -159,7 +159,7 @@ def dataset_arrays(dataset: Dataset) -> Arrays:
 def dataset_from(arrays: Arrays) -> Dataset:
     """Return the dataset of the arrays of an untrusted file; errors of many types are raised for damaged ones."""
     disabled = frozenset(str(label) for label in arrays.get("disabled", ()))
-    if any(label_for(label) != label for label in disabled):
+    if not all(map(is_label, disabled)):
         raise ValueError("a disabled sign is not named as signs are")
     return Dataset(tuple(_takes(arrays)), disabled)
 
@@ -196,7 +196,7 @@ def _takes(arrays: Arrays) -> Iterable[Take]:
     for number, fact in enumerate(facts):
         mine = order[bounds[number] : bounds[number + 1]]
         named = {name: str(fact[name]) for name in _FACTS}
-        if label_for(named["label"]) != named["label"]:
+        if not is_label(named["label"]):
             raise ValueError(f"take {number} has the label {named['label']!r}")
         yield Take(**named, hands=tuple(hands[row] for row in mine), times_s=tuple(times_s[mine].tolist()))
 

@@ -32,7 +32,7 @@ def custom_labels(dataset: Dataset, sided: Sequence[str]) -> tuple[str, ...]:
         found = ", ".join(dataset.labels) or "nothing at all"
         raise TrainingError(f"there is no new sign to learn, only {found}: collect takes with a label of your own")
     for number, label in enumerate(labels):
-        twin = find_sign(label, labels[:number])
+        twin = find_sign(label, (*SIGNS, NONE, *labels[:number]))
         if twin:
             raise TrainingError(f"the labels {twin!r} and {label!r} mean the same sign: give both the same label")
     strangers = [name for name in sided if name not in labels]

@@ -111,6 +111,13 @@ def test_rows_of_others_are_imported(capsys: pytest.CaptureFixture[str]) -> None
     ]
 
 
+def test_a_label_is_one_sign_in_whatever_unicode_form_it_is_typed(capsys: pytest.CaptureFixture[str]) -> None:
+    written(Path("key.csv"), row(1))
+    prints(capsys, "signs", "import", "key.csv", "--labels", "1=Cafe\u0301")
+    prints(capsys, "signs", "import", "key.csv", "--labels", "1=caf\u00e9")
+    assert [take.label for take in load_dataset(Path("signs.npz")).takes] == ["Caf\u00e9"] * 2
+
+
 @pytest.mark.parametrize(
     ("label", "message"),
     [
