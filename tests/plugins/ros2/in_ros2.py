@@ -4,12 +4,15 @@ import logging
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rclpy
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from std_msgs.msg import Bool as TheirBool
 from std_msgs.msg import String as TheirString
 
@@ -59,6 +62,19 @@ def joined() -> Iterator[Join]:
     yield join_as
     for session in sessions:
         session.close()
+
+
+@contextmanager
+def other_node(domain: int) -> Iterator[Any]:
+    """A node ``/other`` of plain rclpy, for as long as the block lasts."""
+    context = rclpy.Context()
+    context.init(args=[], domain_id=domain)
+    node = rclpy.create_node("other", context=context)
+    try:
+        yield node
+    finally:
+        node.destroy_node()
+        context.shutdown()
 
 
 class TestRclpy(SessionContract):
@@ -172,6 +188,70 @@ def test_who_is_not_connected_is_named_once_by_the_names_of_the_graph(
     assert "/swapped: nothing passes between our publisher and the subscriber of /other: the publisher is vol" in line
     node.destroy_node()
     context.shutdown()
+
+
+BY_TOPIC = {"liveliness": LivelinessPolicy.MANUAL_BY_TOPIC}
+ONE_SECOND = {"liveliness_lease_duration": Duration(seconds=1)}
+
+
+@pytest.mark.parametrize(
+    ("request_", "why"),
+    [
+        (
+            {"deadline": Duration(seconds=0.2)},
+            "the subscriber has a deadline that the publisher does not promise to meet "
+            "(ours: reliable, volatile, no deadline; theirs: reliable, volatile, deadline 0.2 s)",
+        ),
+        (
+            BY_TOPIC | ONE_SECOND,
+            "the subscriber wants a liveliness that the publisher does not promise "
+            "(ours: reliable, volatile, automatic liveliness; "
+            "theirs: reliable, volatile, manual by topic liveliness within 1 s)",
+        ),
+        (
+            ONE_SECOND,
+            "the subscriber wants a liveliness that the publisher does not promise "
+            "(ours: reliable, volatile, automatic liveliness; "
+            "theirs: reliable, volatile, automatic liveliness within 1 s)",
+        ),
+    ],
+    ids=["deadline", "liveliness", "lease"],
+)
+def test_a_subscriber_that_wants_what_is_not_promised_is_named(
+    joined: Join, domain: int, caplog: pytest.LogCaptureFixture, request_: dict[str, Any], why: str
+) -> None:
+    with other_node(domain) as node:
+        node.create_subscription(TheirString, "/gesture/hand_sign", lambda _: None, QoSProfile(depth=1, **request_))
+        session = joined()
+        logging.getLogger("handsteer").addHandler(caplog.handler)
+        session.transport.advertise("talker", HAND_SIGN)
+        assert eventually(lambda: not session.wait(0.2) and "nothing passes" in caplog.text)
+    line = f"/gesture/hand_sign: nothing passes between our publisher and the subscriber of /other: {why}"
+    assert line in caplog.text
+
+
+def test_a_publisher_that_promises_more_than_we_want_is_connected_and_not_named(
+    joined: Join, domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    """What we do not want is endless, which rclpy gives as zero or as a huge number."""
+    promised = QoSProfile(depth=1, deadline=Duration(seconds=0.2), **BY_TOPIC, **ONE_SECOND)
+    came: list[object] = []
+    with other_node(domain) as node:
+        publisher = node.create_publisher(TheirString, "/gesture/hand_sign", promised)
+        session = joined()
+        logging.getLogger("handsteer").addHandler(caplog.handler)
+        session.transport.subscribe("listener", HAND_SIGN, came.append)
+
+        def has_come() -> bool:
+            publisher.publish(TheirString(data="Stop"))
+            return not session.wait(0.2) and bool(came)
+
+        assert eventually(has_come)
+        # All are compared at once, so that what is wrong there would be named by now.
+        node.create_subscription(TheirBool, "/stop", lambda _: None, QoSProfile(depth=1, **BY_TOPIC))
+        session.transport.advertise("page", STOP)
+        assert eventually(lambda: not session.wait(0.2) and "/stop: nothing passes" in caplog.text)
+    assert "/gesture/hand_sign: nothing passes" not in caplog.text
 
 
 def test_publishers_of_another_type_are_not_those_of_a_topic(joined: Join, domain: int) -> None:

@@ -16,7 +16,7 @@ from cyclonedds.idl import make_idl_struct
 from rosbags.interfaces import Nodetype
 
 from handsteer.messages import Topic, type_name
-from handsteer.plugins.ros2.base_transport import Profile, offered, requested
+from handsteer.plugins.ros2.base_transport import NO_DEADLINE, NO_LIVELINESS, Profile, offered, requested
 from handsteer.transports.encoding import dds_type_name, type_hash, types
 
 _RELIABLE = Policy.Reliability.Reliable(0)
@@ -94,11 +94,11 @@ def misfits(offered: Qos, requested: Qos) -> list[str]:
     if _rank(offered, "Durability", _DURABILITIES) < _rank(requested, "Durability", _DURABILITIES):
         found.append(f"the publisher is {_durability(offered)}, the subscriber wants {_durability(requested)}")
     if _time_ns(offered, "Deadline", "deadline") > _time_ns(requested, "Deadline", "deadline"):
-        found.append("the subscriber has a deadline that the publisher does not promise to meet")
+        found.append(NO_DEADLINE)
     if _liveliness(offered) < _liveliness(requested) or (
         _time_ns(offered, "Liveliness", "lease_duration") > _time_ns(requested, "Liveliness", "lease_duration")
     ):
-        found.append("the subscriber wants a liveliness that the publisher does not promise")
+        found.append(NO_LIVELINESS)
     if _find(offered, "Ownership", Policy.Ownership.Shared) != _find(requested, "Ownership", Policy.Ownership.Shared):
         found.append("one has exclusive ownership, the other shared")
     if _rank(offered, "DestinationOrder", _ORDERS) < _rank(requested, "DestinationOrder", _ORDERS):

@@ -40,6 +40,9 @@ from handsteer.transports.timing import StaleMessageFilter, StopOrder, capture_t
 
 M = TypeVar("M")
 
+NO_DEADLINE = "the subscriber has a deadline that the publisher does not promise to meet"
+NO_LIVELINESS = "the subscriber wants a liveliness that the publisher does not promise"
+"""Reasons why DDS does not connect a publisher and a subscriber, in words."""
 IMAGES = (Image, CompressedImage)
 """Large messages, which have a lower priority than all others on a link."""
 _SENSOR_DATA = (*IMAGES, CameraInfo, Odometry, JointState, LaserScan)

@@ -6,15 +6,19 @@ import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import LivelinessPolicy, QoSProfile
 
 from handsteer.messages import Topic, type_name
-from handsteer.plugins.ros2.base_transport import unconnected
+from handsteer.plugins.ros2.base_transport import NO_DEADLINE, NO_LIVELINESS, unconnected
 from handsteer.transports.base import UNNAMED
 
 _COMPARE_S = 1.0
 _NAME_DUE_S = 4.0
+# Fast DDS's own endless time; that of ROS 2 is longer.
+_ENDLESS_S = 2**31 - 1
+_NS_PER_S = 1_000_000_000
 _UNKNOWN, _REPORTED = "_NODE_NAME_UNKNOWN_", -math.inf
 
 log = logging.getLogger(__name__)
@@ -97,18 +101,48 @@ def _misfits(ours: End, theirs: Any) -> list[str]:
         return [f"ours has the type {type_name(ours.topic.type)}, theirs {theirs.topic_type}"]
     offer, request = (ours.qos, theirs.qos_profile) if ours.publishes else (theirs.qos_profile, ours.qos)
     # rclpy's own comparison takes an endless deadline for one where the other's is given as zero.
-    return [
+    found = [
         f"the publisher is {offered}, the subscriber wants {wanted}"
         for offered, wanted in zip(_in_words(offer), _in_words(request), strict=True)
         if (offered, wanted) in (("best effort", "reliable"), ("volatile", "transient local"))
     ]
+    if _limit_s(offer.deadline) > _limit_s(request.deadline):
+        found.append(NO_DEADLINE)
+    if _is_manual(offer) < _is_manual(request) or (
+        _limit_s(offer.liveliness_lease_duration) > _limit_s(request.liveliness_lease_duration)
+    ):
+        found.append(NO_LIVELINESS)
+    return found
 
 
 def _explained(ours: End, theirs: Any, reasons: list[str]) -> str:
     mine, other = ("publisher", "subscriber") if ours.publishes else ("subscriber", "publisher")
-    profiles = f"(ours: {', '.join(_in_words(ours.qos))}; theirs: {', '.join(_in_words(theirs.qos_profile))})"
+    profiles = f"(ours: {_profile(ours.qos, reasons)}; theirs: {_profile(theirs.qos_profile, reasons)})"
     return unconnected(ours.name, mine, other, node_of(theirs), f"{'; '.join(reasons)} {profiles}")
 
 
 def _in_words(qos: QoSProfile) -> list[str]:
     return [str(each.name).lower().replace("_", " ") for each in (qos.reliability, qos.durability)]
+
+
+def _profile(qos: QoSProfile, reasons: list[str]) -> str:
+    """Return a profile in words, with its deadline and liveliness only where they are among the reasons."""
+    words = _in_words(qos)
+    if NO_DEADLINE in reasons:
+        deadline_s = _limit_s(qos.deadline)
+        words.append("no deadline" if math.isinf(deadline_s) else f"deadline {deadline_s:g} s")
+    if NO_LIVELINESS in reasons:
+        lease_s = _limit_s(qos.liveliness_lease_duration)
+        kind = "manual by topic" if _is_manual(qos) else "automatic"
+        words.append(f"{kind} liveliness" + ("" if math.isinf(lease_s) else f" within {lease_s:g} s"))
+    return ", ".join(words)
+
+
+def _is_manual(qos: QoSProfile) -> bool:
+    return qos.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
+
+
+def _limit_s(duration: Duration) -> float:
+    """Return a duration in seconds; infinite if it is not set, which rclpy gives as zero or as a huge number."""
+    seconds = float(duration.nanoseconds) / _NS_PER_S
+    return seconds if 0.0 < seconds < _ENDLESS_S else math.inf
