@@ -19,6 +19,7 @@ from cyclonedds.internal import InvalidSample
 
 from handsteer.clock import Clock
 from handsteer.messages import Topic
+from handsteer.plugins.dds.addresses import AddressWatch
 from handsteer.plugins.dds.network import network
 from handsteer.plugins.dds.participant import Participant
 from handsteer.plugins.dds.topics import user_data
@@ -42,6 +43,16 @@ class DdsTransport(WireTransport):
         self._participant = Participant(network(os.environ), name)
         self.is_one_machine = self._participant.is_local
         self.crosses_network = not self.is_one_machine
+        self._addresses = AddressWatch() if self.crosses_network else None
+
+    def check(self) -> None:
+        """End the session if the addresses of this machine have been replaced; called regularly.
+
+        Raises:
+            TransportError: They have.
+        """
+        if self._addresses is not None:
+            self._addresses.check()
 
     def close(self) -> None:
         """Leave the domain; may be called twice."""

@@ -129,6 +129,9 @@ class Ros2Session(Session):
         """Wait for at most ``timeout_s`` seconds; return whether this session has been closed.
 
         ROS 2 has no request to end a node.
+
+        Raises:
+            TransportError: The connection to the graph is lost for good.
         """
         self._clock_monitor.check()
         self.transport.check()

@@ -278,7 +278,11 @@ class WireTransport(Ros2Transport):
         self._services.append(self._open_service(name, kind, respond))
 
     def check(self) -> None:
-        """Log problems of the connection to the graph; called regularly."""
+        """Log problems of the connection to the graph; called regularly.
+
+        Raises:
+            TransportError: The connection is lost for good.
+        """
 
     def close(self) -> None:
         """End all publishing, receiving and services; may be called twice."""
