@@ -20,8 +20,8 @@ _ANY, _LOOPBACK = "0.0.0.0", "127."
 class AddressWatch:
     """Ends a session whose addresses have been replaced, as by DHCP or in another Wi-Fi: what it sends goes nowhere.
 
-    Made when this process has joined the domain. An address that was there by then is no replacement: with that of a
-    scanner's own network or of a bridge for containers, a node that is started again would miss the return of a Wi-Fi.
+    Made when this process has joined the domain. An address that was there by then does not replace them: with that of
+    a scanner's own network or of a bridge for containers, a node started again would miss the return of a Wi-Fi.
     """
 
     def __init__(self) -> None:
