@@ -1,8 +1,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handsteer.audit import ERROR, AuditEvent, read_event, setting_changes, without_passwords, write_event
+from handsteer.audit import ERROR, AuditEvent, read_event, setting_changes, write_event
 from handsteer.config import Config, load
+from handsteer.errors import without_passwords
 from handsteer.messages import Log, Time
 
 STAMP = Time(12, 500_000_000)
@@ -47,3 +48,4 @@ def test_passwords_are_left_out() -> None:
     (event,) = setting_changes(Config(), new, "viewer 1")
     assert event.sentence == "changed camera.source from auto to rtsp://10.0.0.2/live"
     assert without_passwords("http://a/b@c") == "http://a/b@c"
+    assert without_passwords("rtsp://admin:P@ss@10.0.0.5/1") == "rtsp://10.0.0.5/1"

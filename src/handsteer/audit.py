@@ -5,12 +5,12 @@ viewer of the page; ``msg`` is a sentence for people; ``function`` is the code o
 about, both for programs.
 """
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from handsteer.config import Config
+from handsteer.errors import without_passwords
 from handsteer.messages import Log, Time
 
 AuditCode = Literal[
@@ -46,7 +46,6 @@ INFO, WARN, ERROR = 20, 30, 40
 
 _CODES = frozenset(get_args(AuditCode))
 _LONGEST = 1000
-_PASSWORD = re.compile(r"(?<=://)[^/\s@]+@")
 
 
 @dataclass(frozen=True)
@@ -109,8 +108,3 @@ def _shown(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return f"{value:g}" if isinstance(value, float) else without_passwords(str(value))
-
-
-def without_passwords(text: str) -> str:
-    """Return ``text`` without the user names and passwords of addresses."""
-    return _PASSWORD.sub("", text)

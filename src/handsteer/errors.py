@@ -153,6 +153,14 @@ def as_name(value: object) -> str:
     return text if len(text) <= LONGEST_QUOTE and text.isprintable() else quoted(text)
 
 
+_PASSWORD = re.compile(r"(?<=://)[^/\s]+@")
+
+
+def without_passwords(text: str) -> str:
+    """Return ``text`` without the user names and passwords of addresses."""
+    return _PASSWORD.sub("", text)
+
+
 def reason_of(error: Exception) -> str:
     """Return why something failed, for a message: of a system error its words without the number."""
     return (error.strerror if isinstance(error, OSError) else None) or str(error)

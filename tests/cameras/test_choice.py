@@ -94,6 +94,28 @@ def test_a_device_is_closed_while_another_camera_is_used_so_that_it_keeps_no_old
     ]
 
 
+def test_a_camera_with_a_pace_of_its_own_is_closed_too_but_not_the_one_of_the_start() -> None:
+    class Paced(Device):
+        period_s = 0.1  # type: ignore[assignment]
+
+    class Paces(Devices):
+        def open(self, source: str, size: Size) -> Camera:
+            self.opened.append(Paced(source, size))
+            return self.opened[-1]
+
+    devices = Paces()
+    cameras = ChoiceOfCameras(devices.open(OWN, devices.size), BrowserCamera(SteppedClock(0.0)), devices)
+    cameras.find()
+    for source in ("/dev/video1", "/dev/video2", OWN):
+        cameras.choose(source)
+        cameras.read()
+    assert [(each.name, each.is_open) for each in devices.opened] == [
+        (OWN, True),
+        ("/dev/video1", False),
+        ("/dev/video2", False),
+    ]
+
+
 def test_another_resolution_opens_the_camera_again_and_stays() -> None:
     cameras, devices = two_webcams()
     cameras.choose(OWN, (320, 240))

@@ -112,7 +112,7 @@ def test_a_device_that_gives_no_picture() -> None:
 
 def test_an_address_that_does_not_answer() -> None:
     with pytest.raises(CameraNotFound, match=r"no picture comes from rtsp://127\.0\.0\.1:9/x: check the address"):
-        Webcam("rtsp://127.0.0.1:9/x", SteppedClock())
+        Webcam("rtsp://me:s@cret@127.0.0.1:9/x?token=secret", SteppedClock())
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 import pytest
 
 from handsteer.cli import signals
+from handsteer.cli.running import signals_ignored
 
 ENDING = ["SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGABRT", "SIGTSTP", "SIGUSR1"]
 
@@ -36,3 +37,14 @@ def test_another_signal_does_not_interrupt_the_end_that_the_first_began() -> Non
             signal.raise_signal(again)
         except KeyboardInterrupt:
             pytest.fail("it was interrupted")
+
+
+def test_none_of_them_interrupts_what_stops_the_robot() -> None:
+    """The guard: ``signals_ignored``, as where a terminal is closed after Ctrl-C."""
+    signals.interrupt_on_signals()
+    with signals_ignored():
+        for number in signals.ending():
+            signal.raise_signal(number)
+    assert not signals.were_raised()
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGTERM)

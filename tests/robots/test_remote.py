@@ -40,10 +40,10 @@ class Link:
         self.transport.subscribe("base", topic, lambda received: self.sent.append(received.message.linear.x))
         self.scanner: Publisher[LaserScan] = self.transport.advertise("scanner", Topic("/front/scan", LaserScan))
 
-    def scan(self, metres: float) -> None:
+    def scan(self, metres: float, frame_id: str = "laser", angle_rad: float = 0.0) -> None:
         now = self.clock.now()
-        header = Header(self.clock.stamp(now), "laser")
-        figures = (0.0, 0.0, 0.1, 0.0, 0.1, 0.1, 8.0)
+        header = Header(self.clock.stamp(now), frame_id)
+        figures = (angle_rad, angle_rad, 0.1, 0.0, 0.1, 0.1, 8.0)
         message = LaserScan(header, *figures, np.array([metres], np.float32), np.zeros(0, np.float32))
         self.scanner.publish(message, now)
 
@@ -71,6 +71,19 @@ def test_each_scan_is_given_once_and_with_its_age() -> None:
     assert scan.ranges.tolist() == [1.5]
     assert scan.age_s == pytest.approx(0.2)
     assert robot.scan() is None
+
+
+def test_the_newest_scan_of_each_scanner_and_sector_is_given() -> None:
+    """The guard: ``_is_of_one_scanner``: what comes between two looks must not hide that there are several."""
+    link, robot = join()
+    robot.scan()
+    for metres in (1.0, 2.0):
+        for scanner in (("front", 0.0), ("rear", 0.0), ("front", 1.0)):
+            link.scan(metres, *scanner)
+        link.scan(metres, "front", 0.01)
+    given = [scan for _ in range(4) if (scan := robot.scan()) is not None]
+    assert [(scan.frame_id, scan.angle_min) for scan in given] == [("", 0.0), ("front", 1.0), ("front", 0.01)]
+    assert {float(scan.ranges[0]) for scan in given} == {2.0}
 
 
 def test_a_robot_without_a_scanner_has_no_scan() -> None:

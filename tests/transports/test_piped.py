@@ -3,6 +3,7 @@ import importlib
 import io
 import os
 import pickle
+import struct
 import subprocess
 import threading
 import time
@@ -205,6 +206,15 @@ def test_a_message_that_is_cut_short_ends_the_pipe() -> None:
     os.write(sink, b"\x00\x00\x00")
     os.close(sink)
     assert pipe.ended.wait(10)
+
+
+def test_a_message_that_is_said_to_be_endless_ends_the_pipe() -> None:
+    source, sink = os.pipe()
+    pipe = Pipe(os.fdopen(source, "rb"), os.fdopen(os.open(os.devnull, os.O_WRONLY), "wb"), trusts=False)
+    pipe.start()
+    os.write(sink, struct.pack("<IQ", 1, 2**63) + b"x")
+    assert pipe.ended.wait(10)
+    os.close(sink)
 
 
 def nested(depth: int) -> list[Any]:

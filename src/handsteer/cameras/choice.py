@@ -155,14 +155,17 @@ class ChoiceOfCameras:
         self._own.close()
 
     def _change(self, wanted: _Wanted) -> None:
-        if self._camera.period_s is None:
-            self._camera.close()  # a device would keep old frames, and may be the one that is opened next
+        before = self._camera
+        if before.period_s is None:
+            before.close()  # a device would keep old frames, and may be the one that is opened next
         try:
             self._camera = self._open(wanted)
         except HandsteerError as error:
             self.on_change()
             wanted.done.set_exception(error)
         else:
+            if before is not self._camera and before is not self._own:
+                before.close()
             self.source, self.size, self.is_far = wanted.source, wanted.size, wanted.is_far
             self.on_change()
             wanted.done.set_result(None)

@@ -12,7 +12,14 @@ import cv2
 
 from handsteer.cameras import Frame
 from handsteer.clock import Clock
-from handsteer.errors import CameraError, CameraInUse, CameraLost, CameraNotFound, CameraUnreadable
+from handsteer.errors import (
+    CameraError,
+    CameraInUse,
+    CameraLost,
+    CameraNotFound,
+    CameraUnreadable,
+    without_passwords,
+)
 from handsteer.picture_files import MOST_PIXELS
 
 _OPEN_TIMEOUT_MS = 5000
@@ -198,8 +205,8 @@ def _open_capture(source: str) -> Capture:
 
 
 def name_of(source: str) -> str:
-    """Return the name for people of the webcam or address ``source``."""
-    return f"webcam {source}" if source.isdigit() else source
+    """Return the name for people of the webcam or address ``source``, without a password or what it asks for."""
+    return f"webcam {source}" if source.isdigit() else without_passwords(source).partition("?")[0]
 
 
 def device_path(source: str) -> Path:
@@ -222,7 +229,7 @@ def _check_device(source: str) -> None:
 
 def _why_closed(source: str) -> CameraError:
     if is_address(source):
-        return CameraNotFound(f"no picture comes from {source}: check the address, and that the camera is on")
+        return CameraNotFound(f"no picture comes from {name_of(source)}: check the address, and that the camera is on")
     path = device_path(source)
     holder = _holder(path)
     if holder:

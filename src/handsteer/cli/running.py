@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from handsteer.cli.signals import ending
 from handsteer.errors import HandsteerError, quoted
 
 if TYPE_CHECKING:
@@ -163,8 +164,8 @@ def freeze_loaded_objects() -> None:
 
 @contextmanager
 def signals_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C and SIGTERM in this block: a second Ctrl-C must not keep the robot from stopping."""
-    handlers = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)}
+    """Ignore what would end the program in this block: a second Ctrl-C must not keep the robot from stopping."""
+    handlers = {number: signal.signal(number, signal.SIG_IGN) for number in ending()}
     try:
         yield
     finally:

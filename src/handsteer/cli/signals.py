@@ -66,7 +66,8 @@ def interrupt_on_signals() -> None:
     _handle(interrupt)
 
 
-def _handle(handler: Handler | signal.Handlers) -> None:
+def ending() -> list[signal.Signals]:
+    """Return the signals of this system that end or suspend the program, and are not to be ignored from its start."""
     numbers = []
     for name in _ENDING:
         number = getattr(signal, name, None)
@@ -76,8 +77,14 @@ def _handle(handler: Handler | signal.Handlers) -> None:
         # shell's background jobs, because the robot must be stopped.
         if name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN:
             continue
-        signal.signal(number, handler)
         numbers.append(number)
+    return numbers
+
+
+def _handle(handler: Handler | signal.Handlers) -> None:
+    numbers = ending()
+    for number in numbers:
+        signal.signal(number, handler)
     if sys.platform != "win32":
         # The parent process may have blocked them until they could be handled.
         signal.pthread_sigmask(signal.SIG_UNBLOCK, numbers)

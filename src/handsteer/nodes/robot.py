@@ -212,7 +212,7 @@ class RobotNode(Node):
         scan = self._robot.scan() if self._scan.has_subscribers else None
         if scan is not None:
             measured_s = self.clock.now() - scan.age_s
-            header = Header(stamp=self.clock.stamp(measured_s), frame_id=self._config.scan_frame_id)
+            header = Header(stamp=self.clock.stamp(measured_s), frame_id=scan.frame_id or self._config.scan_frame_id)
             self._scan.publish(scan_message(header, scan), measured_s)
 
     def _report(self) -> RobotStatus:

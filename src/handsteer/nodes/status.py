@@ -74,7 +74,7 @@ class CameraStatus(Status):
 
     @property
     def short_name(self) -> str:
-        """The camera's name without folders or address, which may contain a password."""
+        """The camera's name without folders or address."""
         return self.camera.rstrip("/").rpartition("/")[2]
 
 

@@ -83,6 +83,7 @@ class RangeScan:
         ranges: (N,), in metres by ray; REP 117: +inf for no obstacle, -inf for one that is too near, NaN for no
             reading.
         age_s: Time since the measurement, in seconds.
+        frame_id: Of another scanner than the robot's first; empty if it is that one's.
     """
 
     angle_min: float
@@ -91,6 +92,7 @@ class RangeScan:
     range_max: float
     ranges: NDArray[np.float32]
     age_s: float = 0.0
+    frame_id: str = ""
 
 
 class Robot(Protocol):

@@ -26,6 +26,9 @@ _LOOK_AGAIN_S = 0.02
 _ZEROS_AT_THE_END = 5
 _BETWEEN_ZEROS_S = 0.02
 _ODOMETRY_DUE_S = 3.0
+_MOST_SCANNERS = 3
+# Some scanners turn a little more or less for each scan.
+_SAME_RAD = 0.2
 _IN_ROS2 = "is its ROS_DOMAIN_ID the same, and, if it is another machine, ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET set?"
 _ADVICE = {
     "zenoh": "is it connected to the same Zenoh router?",
@@ -68,7 +71,8 @@ class RemoteRobot:
         self._odom_topic = _full_name(session, config.odom_topic)
         self._seen: _Seen | None = None
         self._repeats = Repeats()
-        self._scanned: tuple[LaserScan, float] | None = None
+        self._scanned: list[tuple[LaserScan, float]] = []
+        self._scan_frame_id: str | None = None
         self._listens_to_scans = False
         self._senseless = False
         self._linked_s = 0.0
@@ -118,15 +122,17 @@ class RemoteRobot:
         return []
 
     def scan(self) -> RangeScan | None:
-        """Return a scan received since the last call; the first call subscribes."""
+        """Return a scan received since the last call, the newest of each scanner in turn; the first call subscribes."""
         if self._config.scan_topic and not self._listens_to_scans:
             self._listens_to_scans = True
             topic = _topic(self._config.scan_topic, LaserScan, 1)
             self._session.transport.subscribe(_NODE, topic, self._on_scan)
-        scanned, self._scanned = self._scanned, None
-        if scanned is None:
+        if not self._scanned:
             return None
-        message, measured_s = scanned
+        message, measured_s = self._scanned.pop(0)
+        frame_id = message.header.frame_id
+        if self._scan_frame_id is None:
+            self._scan_frame_id = frame_id
         return RangeScan(
             message.angle_min,
             message.angle_increment,
@@ -134,6 +140,7 @@ class RemoteRobot:
             message.range_max,
             message.ranges,
             max(0.0, self._session.clock.now() - measured_s),
+            "" if frame_id == self._scan_frame_id else frame_id,
         )
 
     def commanders(self) -> list[str]:
@@ -174,7 +181,11 @@ class RemoteRobot:
 
     def _on_scan(self, received: Received[LaserScan]) -> None:
         now = self._session.clock.now()
-        self._scanned = received.message, now if received.captured_s is None else received.captured_s
+        scan = received.message
+        # Of several scanners on one topic, or sectors, each is passed on: the collision monitor refuses the mixture.
+        others = [waiting for waiting in self._scanned if not _is_of_one_scanner(waiting[0], scan)]
+        newest = scan, now if received.captured_s is None else received.captured_s
+        self._scanned = [*others[-_MOST_SCANNERS:], newest]
 
     def _trouble(self, *, listens: bool, is_silent: bool) -> str:
         if not listens:
@@ -192,6 +203,10 @@ class RemoteRobot:
         kind = " or ".join(type_name(kind) for kind in (self._topic.type, self._topic.or_type) if kind)
         advice = _ADVICE.get(self._config.kind, _IN_ROS2)
         return f"no node subscribes to {name} with {kind}; is it on, are topic and type right, {advice}"
+
+
+def _is_of_one_scanner(one: LaserScan, other: LaserScan) -> bool:
+    return one.header.frame_id == other.header.frame_id and abs(one.angle_min - other.angle_min) <= _SAME_RAD
 
 
 def _topic(name: str, kind: type[Any], depth: int) -> Topic[Any]:

@@ -43,6 +43,9 @@ _MOST_WAITING = 1000
 _LENGTHS = struct.Struct("<IQ")
 """Bytes of a message's kind and of its content; precede both, so that a message that cannot be read is left out."""
 
+_LARGEST_BYTES = 1 << 28
+"""Of a message; an image of the largest size has a fifth of that."""
+
 _LOG_PERIOD_S = 10.0
 
 
@@ -161,6 +164,8 @@ class Pipe:
             self.close()
 
     def _read_whole(self, size: int) -> bytes:
+        if size > _LARGEST_BYTES:
+            raise ValueError(f"a message of {size} bytes is too large")
         data = self._source.read(size)
         if len(data) < size:
             raise EOFError

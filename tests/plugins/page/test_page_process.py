@@ -173,6 +173,29 @@ def far(near: Graph) -> Iterator[RemoteGraph]:
         yield far
 
 
+def test_a_setting_that_takes_long_delays_no_stop(
+    near: Graph, far: RemoteGraph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where a model's file is on a server that does not answer; the graph's own thread of the pipe carries both."""
+    begun, answered, stops = threading.Event(), threading.Event(), list[Received[Bool]]()
+
+    def wait(*_: object) -> None:
+        begun.set()
+        answered.wait(60)
+
+    monkeypatch.setattr(Graph, "reconfigure", wait)
+    near.transport.subscribe("probe", STOP, stops.append)
+    setting = threading.Thread(target=far.reconfigure, args=(far.config,))
+    try:
+        setting.start()
+        assert begun.wait(30)
+        far.transport.advertise("page", STOP).publish(Bool(data=True))
+        eventually(lambda: bool(stops))
+    finally:
+        answered.set()
+        setting.join()
+
+
 def test_the_world_is_changed_from_afar(near: Graph, far: RemoteGraph) -> None:
     far.change_world(partial(add, shape="box", robot=Pose2D(0.0, 0.0, 0.0))).result(30)
     assert far.state.world is not None

@@ -11,10 +11,9 @@ from typing import Final
 
 from nicegui import ui
 
-from handsteer.audit import without_passwords
 from handsteer.cameras import VIRTUAL_HAND
 from handsteer.cameras.choice import BROWSER, OWN, Size
-from handsteer.errors import HandsteerError
+from handsteer.errors import HandsteerError, without_passwords
 from handsteer.plugins.page.elements import box, button, read_words, sentence, set_property, switch, tag, text
 from handsteer.plugins.page.page import Page
 from handsteer.plugins.page.remote_graph import RemoteGraph

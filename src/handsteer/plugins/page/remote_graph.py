@@ -80,9 +80,10 @@ class GraphServer:
         # Files and devices are opened on threads of their own: the pipe also carries Stop.
         self._recording = ThreadPoolExecutor(1, "recording")
         self._finding = ThreadPoolExecutor(1, "cameras")
+        self._setting = ThreadPoolExecutor(1, "settings")
         graph.recording.on_change = self._send_state
         self._actions: dict[str, Callable[..., Future[None] | None]] = {
-            "reconfigure": graph.reconfigure,
+            "reconfigure": lambda config, by: self._setting.submit(graph.reconfigure, config, by),
             "change_world": graph.robot.change_world,
             "enter_world": graph.robot.enter_world,
             "reset": graph.robot.reset,
@@ -101,6 +102,7 @@ class GraphServer:
         self._gateway.close()
         self._recording.shutdown(wait=False)
         self._finding.shutdown(wait=False)
+        self._setting.shutdown(wait=False)
 
     def _record(self, by: str) -> None:
         folder = RecordingFolder(self._graph.config.recording.folder)

@@ -12,7 +12,7 @@ from handsteer import __version__
 from handsteer.cameras.files import BAGS
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.errors import RecordingError
+from handsteer.errors import RecordingError, without_passwords
 from handsteer.regular_files import read_regular
 
 if TYPE_CHECKING:
@@ -63,7 +63,8 @@ def describe(config: Config | None, clock: Clock, models: Sequence[Path]) -> dic
         except metadata.PackageNotFoundError:
             continue
     if config is not None:
-        about["config"] = config.model_dump_json()
+        camera = config.camera.model_copy(update={"source": without_passwords(config.camera.source)})
+        about["config"] = config.model_copy(update={"camera": camera}).model_dump_json()
     return about | {
         f"model {path.name}": hashlib.sha256(read_regular(path, _LARGEST_MODEL_BYTES)).hexdigest() for path in models
     }
