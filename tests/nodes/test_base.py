@@ -3,6 +3,7 @@ import threading
 import time
 from collections.abc import Iterator
 from functools import partial
+from unittest.mock import Mock
 
 import pytest
 
@@ -115,6 +116,19 @@ def test_on_stop_is_called_even_when_it_raises() -> None:
     node = Bad("bad", InProcessTransport(), SteppedClock())
     node.stop()
     assert node.callback_errors == 1
+
+
+def test_on_stop_is_called_even_when_a_subscription_does_not_end() -> None:
+    ended: list[str] = []
+
+    class Ends(Node):
+        def on_stop(self) -> None:
+            ended.append(self.name)
+
+    node = Ends("ends", InProcessTransport(), SteppedClock())
+    node.subscribe(Topic("/number", int), lambda _: None).close = Mock(side_effect=OSError)  # type: ignore[method-assign]
+    node.stop()
+    assert ended == ["ends"]
 
 
 def test_a_callback_that_hangs_does_not_hold_up_the_end() -> None:

@@ -214,7 +214,7 @@ class Node:
             return
         self._stopped = True
         for subscription in self._subscriptions:
-            subscription.close()
+            self._guard("stop", subscription.close)
         with self._wake:
             self._running = False
             self._wake.notify()
