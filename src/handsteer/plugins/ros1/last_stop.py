@@ -1,7 +1,7 @@
 """A Stop that outlives the master, with which all nodes that remember it end in the same moment."""
 
-import contextlib
 import logging
+import os
 import re
 from pathlib import Path
 
@@ -30,8 +30,12 @@ class LastStop:
             log.warning("the Stop cannot be kept until the master is back: %s", error)
 
     def take(self) -> bool:
-        """Return whether a Stop was kept, once."""
-        with contextlib.suppress(OSError):
+        """Return whether a Stop was kept; once, unless its file cannot be removed."""
+        try:
             self._file.unlink()
-            return True
-        return False
+        except FileNotFoundError:
+            return False
+        except OSError as error:
+            log.warning("a Stop that was kept cannot be removed: %s", error)
+            return os.path.exists(self._file)  # noqa: PTH110 - False also where the folder cannot be read
+        return True
