@@ -45,7 +45,7 @@ def _clock_that_runs_in_sleep() -> Callable[[], float]:
 monotonic = _clock_that_runs_in_sleep()
 """Return monotonic seconds that include those in which the machine sleeps.
 
-``time.monotonic()`` stops for these on Linux and macOS, so that whatever is as old as a night would count as new.
+``time.monotonic()`` stops for these on Linux and macOS, so that what was received before a sleep would count as new.
 """
 
 

@@ -205,7 +205,7 @@ def _open_capture(source: str) -> Capture:
 
 
 def name_of(source: str) -> str:
-    """Return the name for people of the webcam or address ``source``, without a password or what it asks for."""
+    """Return the name for people of the webcam or address ``source``, without a password or a query."""
     return f"webcam {source}" if source.isdigit() else without_passwords(source).partition("?")[0]
 
 

@@ -5,14 +5,13 @@ import math
 import numpy as np
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.messages import NO_STAMP, LaserScan, Pose
+from handsteer.messages import NO_STAMP, LaserScan, Pose, yaw_of
+from handsteer.robots import SAME_SCANNER_RAD
 
 _MOVED_M, _TURNED_RAD = 0.1, 0.1
 # Walls that are parallel to a straight way look the same all along it; at this angle and distance nothing can be one.
 _AHEAD_RAD, _NEAR_M = math.radians(5), 4.0
 _MIXED_S = 2.0
-# Some scanners turn a little more or less for each scan.
-_SAME_RAD = 0.2
 
 
 class MixedScans:
@@ -28,7 +27,7 @@ class MixedScans:
         frame, lowest, highest = scan.header.frame_id, min(scan.angle_min, last_rad), max(scan.angle_min, last_rad)
         self._covered = frame, lowest, highest
         if before is not None:
-            is_same = before[0] == frame and math.dist(before[1:], (lowest, highest)) <= _SAME_RAD
+            is_same = before[0] == frame and math.dist(before[1:], (lowest, highest)) <= SAME_SCANNER_RAD
             self._changed_s = self._changed_s if is_same else now_s
         return now_s - self._changed_s < _MIXED_S
 
@@ -62,7 +61,7 @@ class FrozenScans:
         if self._pose is None or is_again:
             return True, False
         moved_m = math.dist(_place(self._pose), _place(self._since))
-        turned_rad = abs(math.remainder(_yaw(self._pose) - _yaw(self._since), math.tau))
+        turned_rad = abs(math.remainder(yaw_of(self._pose.orientation) - yaw_of(self._since.orientation), math.tau))
         has_moved = moved_m > _MOVED_M and _sees_ahead(scan, rule)
         return True, has_moved or (turned_rad > _TURNED_RAD and _sees_shapes(scan))
 
@@ -73,10 +72,6 @@ def _is_same(one: LaserScan, other: LaserScan) -> bool:
 
 def _place(pose: Pose) -> tuple[float, float]:
     return pose.position.x, pose.position.y
-
-
-def _yaw(pose: Pose) -> float:
-    return 2.0 * math.atan2(pose.orientation.z, pose.orientation.w)
 
 
 def _sees_shapes(scan: LaserScan) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 
 from handsteer.config import RobotConfig
 from handsteer.messages import CMD_VEL, LaserScan, Odometry, Topic, TurtlePose, type_name, yaw_of
-from handsteer.robots import Obstacle, RangeScan, RobotState
+from handsteer.robots import SAME_SCANNER_RAD, Obstacle, RangeScan, RobotState
 from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.description import robot_description
 from handsteer.transports.base import Received, Session
@@ -27,8 +27,6 @@ _ZEROS_AT_THE_END = 5
 _BETWEEN_ZEROS_S = 0.02
 _ODOMETRY_DUE_S = 3.0
 _MOST_SCANNERS = 3
-# Some scanners turn a little more or less for each scan.
-_SAME_RAD = 0.2
 _IN_ROS2 = "is its ROS_DOMAIN_ID the same, and, if it is another machine, ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET set?"
 _ADVICE = {
     "zenoh": "is it connected to the same Zenoh router?",
@@ -206,7 +204,7 @@ class RemoteRobot:
 
 
 def _is_of_one_scanner(one: LaserScan, other: LaserScan) -> bool:
-    return one.header.frame_id == other.header.frame_id and abs(one.angle_min - other.angle_min) <= _SAME_RAD
+    return one.header.frame_id == other.header.frame_id and abs(one.angle_min - other.angle_min) <= SAME_SCANNER_RAD
 
 
 def _topic(name: str, kind: type[Any], depth: int) -> Topic[Any]:

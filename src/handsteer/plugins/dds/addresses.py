@@ -65,7 +65,7 @@ def sending_addresses() -> set[str]:
         return set()
     own = set()
     for each in _SOCKETS.iterdir():
-        with contextlib.suppress(OSError):  # closed meanwhile
+        with contextlib.suppress(OSError):  # closed since it was listed
             own.add(str(each.readlink()))
     rows = [row.split() for row in _UDP.read_text().splitlines()[1:]]
     found = {_address(row[_LOCAL]) for row in rows if f"socket:[{row[_INODE]}]" in own}

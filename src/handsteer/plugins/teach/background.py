@@ -1,4 +1,4 @@
-"""Trains in a separate process with a single thread, so that a robot can be driven meanwhile.
+"""Trains in a separate process with a single thread, so that a robot can be driven at the same time.
 
 In the process of a graph, training would block the interpreter for the nodes, and the linear algebra library would use
 all processors: if one is busy, its threads wait for each other, and training takes several times as long.
