@@ -173,6 +173,8 @@ ODOM = Topic("/robot_diff_drive_controller/odom", Odometry)
 TF = Topic("/tf", TFMessage, is_global=True, depth=10)
 JOINT_STATES = Topic("/joint_states", JointState)
 SCAN = Topic("/scan", LaserScan)
+SAME_SCANNER_RAD = 0.2
+"""By how much the angles of one scanner's scans may differ: some turn a little more or less for each."""
 CLOCK = Topic("/clock", ClockMessage, is_global=True)
 ROBOT_DESCRIPTION = Topic("/robot_description", String, latched=True)
 WORLD_MARKERS = Topic("/world/markers", MarkerArray)

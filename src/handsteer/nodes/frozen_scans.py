@@ -5,8 +5,7 @@ import math
 import numpy as np
 
 from handsteer.config import CollisionMonitorConfig
-from handsteer.messages import NO_STAMP, LaserScan, Pose, yaw_of
-from handsteer.robots import SAME_SCANNER_RAD
+from handsteer.messages import NO_STAMP, SAME_SCANNER_RAD, LaserScan, Pose, yaw_of
 
 _MOVED_M, _TURNED_RAD = 0.1, 0.1
 # Walls that are parallel to a straight way look the same all along it; at this angle and distance nothing can be one.

@@ -71,10 +71,6 @@ class Obstacle:
     orientation: tuple[float, float, float, float]
 
 
-SAME_SCANNER_RAD = 0.2
-"""By how much the angles of one scanner's scans may differ: some turn a little more or less for each."""
-
-
 @dataclass(frozen=True, eq=False)
 class RangeScan:
     """A laser scan: one turn, or a part of one.

@@ -8,8 +8,8 @@ from functools import partial
 from typing import Any
 
 from handsteer.config import RobotConfig
-from handsteer.messages import CMD_VEL, LaserScan, Odometry, Topic, TurtlePose, type_name, yaw_of
-from handsteer.robots import SAME_SCANNER_RAD, Obstacle, RangeScan, RobotState
+from handsteer.messages import CMD_VEL, SAME_SCANNER_RAD, LaserScan, Odometry, Topic, TurtlePose, type_name, yaw_of
+from handsteer.robots import Obstacle, RangeScan, RobotState
 from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.description import robot_description
 from handsteer.transports.base import Received, Session
