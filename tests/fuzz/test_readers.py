@@ -36,6 +36,7 @@ from handsteer.messages import (
     Topic,
     type_name,
 )
+from handsteer.plugins.page.editing import edit
 from handsteer.plugins.page.elements import read_words
 from handsteer.plugins.page.settings_fields import FIELDS
 from handsteer.plugins.page.steering_input import SteeringInput, read_deflection, read_number
@@ -49,7 +50,6 @@ from handsteer.plugins.teach.exchange import read_class_names, read_keypoints
 from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
 from handsteer.recognition.shipped_signs import DEFAULT_MODEL, load_model
 from handsteer.robots.description import joints, robot_description, visuals
-from handsteer.robots.editing import edit
 from handsteer.robots.world import load_world, parse_world
 from handsteer.transports.encoding import decode, encode
 from handsteer.types import SIGNS, Velocity

@@ -23,8 +23,8 @@ from handsteer.messages import (
 from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.robot import RobotNode
 from handsteer.nodes.status import RobotStatus
+from handsteer.plugins.page.editing import add, edit, remove
 from handsteer.plugins.sim.simulated import SimulatedRobot
-from handsteer.robots.editing import add, edit, remove
 from handsteer.robots.world import World, load_world
 from handsteer.types import CourseState, Pose2D
 from tests.nodes.stepping import Bench

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from handsteer.errors import WorldError
-from handsteer.robots.editing import rename
+from handsteer.plugins.page.editing import rename
 from handsteer.robots.world import World, load_world, parse_world, shipped_worlds, write_world
 
 BOX = "name: a, shape: box, size: [1, 1, 1], position: [3, 0]"

@@ -32,7 +32,7 @@ from handsteer.messages import (
     Twist,
     twist,
 )
-from handsteer.robots.editing import edit
+from handsteer.plugins.page import editing
 from handsteer.robots.world import load_world
 from handsteer.testing.transport_contract import TransportContract, eventually
 from handsteer.transports import piped
@@ -47,7 +47,7 @@ def joined() -> tuple[Pipe, Pipe]:
     """Return both ends of a pipe, not started: the parent's, then the child's."""
     there, back = os.pipe(), os.pipe()
     return (
-        Pipe(os.fdopen(back[0], "rb"), os.fdopen(there[1], "wb"), trusts=False),
+        Pipe(os.fdopen(back[0], "rb"), os.fdopen(there[1], "wb"), trusts=False, pure_modules=[editing.__name__]),
         Pipe(os.fdopen(there[0], "rb"), os.fdopen(back[1], "wb"), trusts=True),
     )
 
@@ -267,14 +267,19 @@ def test_a_parent_runs_no_code_of_its_child(
 @pytest.mark.parametrize("name", ["field", "Any", "dataclass", "replace", "twist.__globals__", "builtins"])
 def test_of_a_module_of_data_its_own_parts_are_read_only(name: str) -> None:
     with pytest.raises(pickle.UnpicklingError):
-        piped._DataUnpickler(io.BytesIO(f"chandsteer.messages\n{name}\n.".encode())).load()
+        piped._DataUnpickler(io.BytesIO(f"chandsteer.messages\n{name}\n.".encode()), piped._PURE_MODULES).load()
+
+
+def test_functions_are_read_of_the_named_modules_only() -> None:
+    with pytest.raises(pickle.UnpicklingError):
+        piped._DataUnpickler(io.BytesIO(pickle.dumps(editing.edit)), piped._PURE_MODULES).load()
 
 
 DATA = [
     *TOPICS,
     load(base={"camera": {"source": "virtual"}}),
     load_world("obstacles"),
-    partial(edit, name="box", fields={"x": 1.0}, section="obstacles"),
+    partial(editing.edit, name="box", fields={"x": 1.0}, section="obstacles"),
     np.zeros((2, 3), np.uint8),
     np.float64(0.5),
     np.datetime64("2026-01-01"),

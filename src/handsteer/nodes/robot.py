@@ -46,8 +46,7 @@ from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.surroundings import Surroundings
 from handsteer.nodes.timing import StallGuard
 from handsteer.robots import RangeScan, Robot, RobotState, Waiting
-from handsteer.robots.editing import Change
-from handsteer.robots.world import World
+from handsteer.robots.world import Change, World
 from handsteer.transports.base import Call, Received, Transport
 from handsteer.types import ZERO, CourseState, Pose2D, Velocity
 

@@ -10,8 +10,7 @@ from handsteer.nodes.base import Node
 from handsteer.nodes.world_markers import Touches, gate_strips, world_markers
 from handsteer.robots import InWorld, Robot, RobotState
 from handsteer.robots.course import Referee
-from handsteer.robots.editing import Change
-from handsteer.robots.world import World
+from handsteer.robots.world import Change, World
 from handsteer.transports.base import Call
 from handsteer.types import CourseState
 

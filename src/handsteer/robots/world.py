@@ -15,6 +15,7 @@ The robot starts at the origin, facing +x. Metres, kilograms and radians; x forw
 """
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -156,6 +157,10 @@ class World(Section):
                     raise ValueError(f"two are called {quoted(thing.name)}; every {kind} needs a name of its own")
                 seen.add(thing.name)
         return self
+
+
+Change = Callable[[World], World]
+"""Makes a changed world of a world."""
 
 
 def shipped_worlds() -> list[str]:

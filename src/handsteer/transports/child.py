@@ -5,7 +5,7 @@ import logging
 import logging.handlers
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from subprocess import PIPE, Popen, TimeoutExpired
 from typing import Final
@@ -26,13 +26,14 @@ class Child:
 
     Args:
         module: Full name of the module.
+        pure_modules: Those whose functions it may send; see :class:`~handsteer.transports.piped.Pipe`.
 
     Attributes:
         process: The process.
         pipe: Our end of the pipe, not started yet.
     """
 
-    def __init__(self, module: str) -> None:
+    def __init__(self, module: str, pure_modules: Collection[str] = ()) -> None:
         path = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
         self.process = Popen(
             [sys.executable, "-P", "-m", module],
@@ -44,7 +45,7 @@ class Child:
         assert self.process.stdout is not None
         assert self.process.stdin is not None
         # It may serve a network, which must not reach this process.
-        self.pipe = Pipe(self.process.stdout, self.process.stdin, trusts=False)
+        self.pipe = Pipe(self.process.stdout, self.process.stdin, trusts=False, pure_modules=pure_modules)
         self.pipe.on("log", _log)
 
     @property

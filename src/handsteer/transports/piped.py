@@ -20,7 +20,7 @@ import sys
 import threading
 import weakref
 from collections import deque
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Collection, Hashable
 from typing import IO, Any, Final, TypeVar
 
 from pydantic import BaseModel
@@ -50,7 +50,7 @@ _LOG_PERIOD_S = 10.0
 
 
 _DATA: Final = (BaseModel, HandsteerError, enum.Enum, logging.LogRecord, functools.partial)
-_PURE_MODULES: Final = frozenset({"handsteer.messages", "handsteer.robots.editing"})
+_PURE_MODULES: Final = frozenset({"handsteer.messages"})
 """Their functions change nothing."""
 _BUILT_IN: Final = frozenset(
     {
@@ -68,16 +68,20 @@ _BUILT_IN: Final = frozenset(
 class _DataUnpickler(pickle.Unpickler):
     """Makes objects of data only, so that the process that wrote the pickle cannot run code here."""
 
+    def __init__(self, source: IO[bytes], pure: frozenset[str]) -> None:
+        super().__init__(source)
+        self._pure = pure
+
     def find_class(self, module: str, name: str) -> Any:
-        return _data_class(module, name)
+        return _data_class(module, name, self._pure)
 
 
 @functools.cache
-def _data_class(module: str, name: str) -> Any:
-    if module in _PURE_MODULES:
+def _data_class(module: str, name: str, pure: frozenset[str]) -> Any:
+    if module in pure:
         importlib.import_module(module)
     found = getattr(sys.modules.get(module), name, None)
-    is_ours = module in _PURE_MODULES and getattr(found, "__module__", "") == module
+    is_ours = module in pure and getattr(found, "__module__", "") == module
     is_data = isinstance(found, type) and (dataclasses.is_dataclass(found) or issubclass(found, _DATA))
     if found is None or not (is_ours or is_data or (module, name) in _BUILT_IN):
         raise pickle.UnpicklingError(f"{module}.{name} is not a class of data")
@@ -94,15 +98,17 @@ class Pipe:
         sink: Read by the other process.
         trusts: Whether what the other process sends may be any object. Otherwise it has to be data: plain values,
             arrays, dataclasses, models, enumerations, errors and log records of modules that are loaded.
+        pure_modules: Full names of further modules whose functions it may send, as they change nothing.
 
     Attributes:
         ended: Set when either end is closed, or the other process has ended.
     """
 
-    def __init__(self, source: IO[bytes], sink: IO[bytes], *, trusts: bool) -> None:
+    def __init__(self, source: IO[bytes], sink: IO[bytes], *, trusts: bool, pure_modules: Collection[str] = ()) -> None:
         self._source = source
         self._sink = sink
-        self._unpickler = pickle.Unpickler if trusts else _DataUnpickler
+        data = functools.partial(_DataUnpickler, pure=_PURE_MODULES.union(pure_modules))
+        self._unpickler: Callable[[IO[bytes]], pickle.Unpickler] = pickle.Unpickler if trusts else data
         self._handlers: dict[str, Callable[..., object]] = {}
         self._news = threading.Condition()
         self._queues: dict[Hashable, deque[tuple[Any, ...]]] = {}

@@ -10,11 +10,11 @@ from handsteer.config import Config
 from handsteer.graph import Graph
 from handsteer.messages import AUDIT, Log
 from handsteer.nodes.steering import SteeringNode
+from handsteer.plugins.page.editing import add
 from handsteer.plugins.page.node import DashboardNode
 from handsteer.plugins.page.settings import Settings, SettingsFile
 from handsteer.plugins.page.settings_fields import FIELDS
 from handsteer.plugins.page.viewers import ANSWER_S, ControlLease, PageAudit
-from handsteer.robots.editing import add
 from handsteer.testing.transport_contract import eventually
 from handsteer.transports.base import Received
 from handsteer.transports.in_process import InProcessTransport

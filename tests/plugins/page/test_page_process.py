@@ -21,9 +21,9 @@ from handsteer.config import load
 from handsteer.errors import ConfigError, DashboardError, FrameError, TransportError, WorldError
 from handsteer.graph import Graph
 from handsteer.messages import CMD_VEL, STOP, Bool, Twist
+from handsteer.plugins.page.editing import add, remove
 from handsteer.plugins.page.page_process import PageProcess
 from handsteer.plugins.page.remote_graph import RemoteGraph
-from handsteer.robots.editing import add, remove
 from handsteer.robots.world import load_world
 from handsteer.testing.transport_contract import eventually
 from handsteer.transports.base import Received

@@ -3,11 +3,11 @@ from pathlib import Path
 import pytest
 
 from handsteer.errors import WorldError
+from handsteer.plugins.page.editing import add, add_gate, edit, numeric_properties, rename
 from handsteer.plugins.page.world_desk import MOST_STEPS, History
 from handsteer.plugins.page.world_editor import LARGEST_FILE_BYTES, read_file
 from handsteer.plugins.page.world_plan import bounds, union
 from handsteer.robots import Shape
-from handsteer.robots.editing import add, add_gate, edit, numeric_properties, rename
 from handsteer.robots.world import World, load_world, named_by_file, parse_world, write_world
 from handsteer.types import Pose2D
 

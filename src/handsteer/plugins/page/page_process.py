@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from handsteer.errors import DashboardError, needing
 from handsteer.graph import Graph
+from handsteer.plugins.page import editing
 from handsteer.plugins.page.remote_graph import GraphServer, RemoteGraph
 from handsteer.plugins.page.viewers import PageAudit
 from handsteer.plugins.study.session import Task
@@ -43,7 +44,7 @@ class PageProcess:
         with needing("the page (a run with --headless does without)", "page", "nicegui"):
             if importlib.util.find_spec("nicegui") is None:  # importing takes a second; the other process does it
                 raise ModuleNotFoundError(name="nicegui")
-        self._child = Child(__name__)
+        self._child = Child(__name__, pure_modules=[editing.__name__])
         self.process = self._child.process
         self._address: Future[str] = Future()
         self._server: GraphServer | None = None

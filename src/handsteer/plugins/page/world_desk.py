@@ -7,10 +7,10 @@ from functools import partial
 from typing import Literal
 
 from handsteer.errors import HandsteerError
+from handsteer.plugins.page.editing import replace
 from handsteer.plugins.page.page import Page
 from handsteer.plugins.page.remote_graph import RemoteGraph
-from handsteer.robots.editing import Change, replace
-from handsteer.robots.world import World
+from handsteer.robots.world import Change, World
 
 MOST_STEPS = 50
 """The oldest changes beyond these cannot be undone."""

@@ -11,13 +11,8 @@ from typing import Any, get_args
 from nicegui import ui
 
 from handsteer.errors import WorldError
-from handsteer.plugins.page.elements import box, button, switch, text
-from handsteer.plugins.page.world_desk import WorldDesk
-from handsteer.plugins.page.world_plan import ThingForm, Tool, WorldPlan, read_tool
-from handsteer.robots import Shape
-from handsteer.robots.editing import (
+from handsteer.plugins.page.editing import (
     MOST_OBSTACLES,
-    Change,
     Place,
     Section,
     add,
@@ -29,7 +24,12 @@ from handsteer.robots.editing import (
     remove,
     reorder,
 )
+from handsteer.plugins.page.elements import box, button, switch, text
+from handsteer.plugins.page.world_desk import WorldDesk
+from handsteer.plugins.page.world_plan import ThingForm, Tool, WorldPlan, read_tool
+from handsteer.robots import Shape
 from handsteer.robots.world import (
+    Change,
     Gate,
     Thing,
     World,

@@ -5,6 +5,7 @@ from typing import Final
 
 from nicegui import ui
 
+from handsteer.plugins.page.editing import rename
 from handsteer.plugins.page.elements import box, button, card, set_property, switch, tag, text
 from handsteer.plugins.page.node import DashboardNode
 from handsteer.plugins.page.page import Page, PageContext
@@ -12,7 +13,6 @@ from handsteer.plugins.page.state import PageState
 from handsteer.plugins.page.world_desk import WorldDesk
 from handsteer.plugins.page.world_editor import WorldEditor
 from handsteer.plugins.page.world_plan import WorldPlan
-from handsteer.robots.editing import rename
 
 _STOPS = "A change stops the robot, and it stays stopped until you press Reset."
 _LONGEST: Final = 200

@@ -6,8 +6,8 @@ from typing import Any, Literal, get_args
 
 from nicegui import ui
 
+from handsteer.plugins.page.editing import Place, Section, heading, numeric_properties, place
 from handsteer.plugins.page.elements import STATIC, box, switch
-from handsteer.robots.editing import Place, Section, heading, numeric_properties, place
 from handsteer.robots.world import Gate, Thing, World
 from handsteer.types import Pose2D
 

@@ -31,6 +31,7 @@ from handsteer.messages import (
 from handsteer.nodes.diagnostics import write_status
 from handsteer.nodes.journal import journal_topic
 from handsteer.nodes.status import RobotStatus
+from handsteer.plugins.page.editing import rename
 from handsteer.plugins.record.mcap_reader import McapFile
 from handsteer.plugins.record.mcap_writer import McapWriter
 from handsteer.plugins.record.recorded import Recorded
@@ -38,7 +39,6 @@ from handsteer.plugins.record.replay import report_words as words
 from handsteer.plugins.record.replay.drive_facts import DriveFacts
 from handsteer.plugins.record.replay.drive_reader import read_drive
 from handsteer.plugins.record.replay.stand_log import MOST_PICTURES
-from handsteer.robots.editing import rename
 from handsteer.robots.world import load_world
 from handsteer.transports.encoding import encode
 from handsteer.types import CourseState

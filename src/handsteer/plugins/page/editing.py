@@ -12,8 +12,6 @@ from handsteer.robots import Shape
 from handsteer.robots.world import LONGEST_NAME, Box, Cylinder, Gate, Sphere, Thing, World, describe_problem
 from handsteer.types import Pose2D
 
-Change = Callable[[World], World]
-
 Section = Literal["obstacles", "gates"]
 """What can be edited in a world."""
 

@@ -7,9 +7,7 @@ from hypothesis import strategies as st
 
 from handsteer.config import RobotConfig
 from handsteer.errors import WorldError
-from handsteer.plugins.sim.simulated import SimulatedRobot
-from handsteer.robots import Shape
-from handsteer.robots.editing import (
+from handsteer.plugins.page.editing import (
     MOST_OBSTACLES,
     add,
     add_gate,
@@ -23,6 +21,8 @@ from handsteer.robots.editing import (
     remove,
     reorder,
 )
+from handsteer.plugins.sim.simulated import SimulatedRobot
+from handsteer.robots import Shape
 from handsteer.robots.world import Box, Thing, World, load_world
 from handsteer.types import Pose2D
 
