@@ -1,6 +1,8 @@
+import gc
 import re
 import threading
 import time
+import weakref
 from collections.abc import Iterator
 from functools import partial
 from unittest.mock import Mock
@@ -11,6 +13,7 @@ from handsteer.clock import RealClock, SteppedClock, to_stamp
 from handsteer.config import Config
 from handsteer.messages import DIAGNOSTICS, HAND_SIGN, DiagnosticArray, String, Topic
 from handsteer.nodes.base import Node
+from handsteer.nodes.callbacks import Inbox
 from handsteer.nodes.diagnostics import write_status
 from handsteer.nodes.status import CameraStatus
 from handsteer.transports.base import Received
@@ -92,6 +95,23 @@ def test_with_a_key_the_newest_of_each_publisher_is_kept() -> None:
             reports.publish(write_status(status, name, to_stamp(0.0)))
     node.spin_once()
     assert sorted(got) == ["a new: delivers frames", "b new: delivers frames"]
+
+
+def test_a_closed_subscription_processes_nothing_more_and_leaves_nothing_behind() -> None:
+    node, _, transport = make()
+    signs = transport.advertise("other", HAND_SIGN)
+    heard: list[str] = []
+    inboxes = weakref.WeakSet[Inbox[String]]()
+    for _ in range(3):
+        subscription = node.subscribe(HAND_SIGN, lambda received: heard.append(received.message.data))
+        inboxes.update(node._inboxes)
+        signs.publish(String(data="Forward"))
+        subscription.close()
+        node.spin_once()
+    del subscription
+    gc.collect()
+    assert heard == []
+    assert not inboxes
 
 
 def test_the_thread_sleeps_until_there_is_work_and_ends_at_stop() -> None:

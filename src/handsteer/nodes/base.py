@@ -22,6 +22,17 @@ log = logging.getLogger(__name__)
 _LOOK_FOR_LISTENERS_S = 0.5
 
 
+class _Subscription:
+    """A subscription of a node, whose inbox goes with it."""
+
+    def __init__(self, subscription: Subscription, forget: Callable[[], None]) -> None:
+        self._subscription, self._forget = subscription, forget
+
+    def close(self) -> None:
+        self._subscription.close()
+        self._forget()
+
+
 class Node:
     """A named part of the graph; its callbacks and timers never run concurrently.
 
@@ -64,7 +75,7 @@ class Node:
         self._timers: list[Timer] = []
         self._new_config: Config | None = None
         self._failures = FailureLog(name)
-        self._subscriptions: list[Subscription] = []
+        self._subscriptions: dict[Inbox[Any], Subscription] = {}
         self._wake = threading.Condition()
         self._serving = threading.Lock()
         self._running = False
@@ -107,7 +118,7 @@ class Node:
             queue: Where messages wait that are processed each, in order; one in each spin.
 
         Returns:
-            Ends the subscription when closed; so does the end of the node.
+            Ends the subscription when closed, with what waits to be processed; so does the end of the node.
         """
         name = self.transport.topic_name(topic)
         self._topics["listens to"].add(name)
@@ -127,9 +138,15 @@ class Node:
                 with self._wake:
                     self._wake.notify()
 
-        subscription = self.transport.subscribe(self.name, topic, deliver)
-        self._subscriptions.append(subscription)
+        subscription = _Subscription(self.transport.subscribe(self.name, topic, deliver), lambda: self._remove(inbox))
+        self._subscriptions[inbox] = subscription
         return subscription
+
+    def _remove(self, inbox: Inbox[Any]) -> None:
+        with self._wake:
+            self._subscriptions.pop(inbox, None)
+            if inbox in self._inboxes:
+                self._inboxes.remove(inbox)
 
     def every(self, period_s: float, callback: Callable[[], None]) -> "Timer":
         """Call ``callback`` every ``period_s`` seconds; missed calls are skipped, not made up for."""
@@ -213,7 +230,7 @@ class Node:
         if self._stopped:
             return
         self._stopped = True
-        for subscription in self._subscriptions:
+        for subscription in list(self._subscriptions.values()):
             self._guard("stop", subscription.close)
         with self._wake:
             self._running = False

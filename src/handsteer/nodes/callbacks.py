@@ -44,7 +44,7 @@ class Timer:
         self.due_s = max(self.due_s, time_s)
 
 
-@dataclass
+@dataclass(eq=False)
 class Inbox(Generic[M]):
     """The newest messages of a topic that wait for a node.
 
