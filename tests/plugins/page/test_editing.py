@@ -74,6 +74,11 @@ def test_what_is_added_touches_neither_the_robot_nor_its_start_nor_other_things(
         assert world.obstacles[-1].position == place
 
 
+def test_a_robot_that_is_nowhere_has_no_place_near_it() -> None:
+    with pytest.raises(WorldError, match="no free place"):
+        free_place(World(), Pose2D(math.nan, 0.0, 0.0), 0.2)
+
+
 def test_a_world_has_room_for_so_many_and_no_more() -> None:
     ball = {"shape": "sphere", "radius": 0.1}
     things = [{**ball, "name": f"ball {n}", "position": [n, 9]} for n in range(MOST_OBSTACLES)]

@@ -30,6 +30,7 @@ _WALL_WIDTH_M, _WALL_HEIGHT_M = 0.1, 0.5
 _ROBOT_RADIUS_M = 0.4
 _GAP_M = 0.1
 _RING_M = 0.5
+_MOST_RINGS = 200
 
 
 def rename(world: World, name: str) -> World:
@@ -50,7 +51,7 @@ def add(world: World, shape: Shape, robot: Pose2D) -> World:
     """Return ``world`` with one more thing, uniquely named, at the first free place in front of ``robot``.
 
     Raises:
-        WorldError: There are too many already.
+        WorldError: There are too many already, or no place is free.
     """
     fields = {"name": unique_name(world, shape), "shape": shape, "position": (0.0, 0.0), **_NEW[shape]}
     radius = footprint_m(_checked(world, [fields]).obstacles[-1])
@@ -223,6 +224,9 @@ def free_place(world: World, robot: Pose2D, radius_m: float) -> tuple[float, flo
     """Return x and y of a free place for a thing of ``radius_m`` near the robot, in front of it if possible.
 
     Places are searched in rings around the robot, each from its front to both sides. The thing is taken as a circle.
+
+    Raises:
+        WorldError: There is none within 100 m.
     """
 
     def is_free(x: float, y: float) -> bool:
@@ -230,8 +234,7 @@ def free_place(world: World, robot: Pose2D, radius_m: float) -> tuple[float, flo
         things = (_distance_m(thing, x, y) for thing in world.obstacles)
         return min(*starts, *things) >= radius_m + _GAP_M
 
-    ring = 2
-    while True:
+    for ring in range(2, _MOST_RINGS):
         reach_m = ring * _RING_M + radius_m
         for step in range(2 * ring + 1):
             for side in (1, -1):
@@ -240,7 +243,7 @@ def free_place(world: World, robot: Pose2D, radius_m: float) -> tuple[float, flo
                 y = round(robot.y + reach_m * math.sin(bearing), 2)
                 if is_free(x, y):
                     return x, y
-        ring += 1
+    raise WorldError("there is no free place near the robot: remove something first")
 
 
 def _distance_m(thing: Thing, x: float, y: float) -> float:

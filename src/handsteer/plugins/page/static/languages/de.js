@@ -603,6 +603,7 @@ const WORDS = {
   "{}: is larger than # kB, which no world should be": "{}: ist größer als # kB, was keine Welt sein sollte",
   "{}: is larger than # kB, which no such file should be": "{}: ist größer als # kB, was keine solche Datei sein sollte",
   "the world is full: # things are the most that can be put in by hand": "die Welt ist voll: mehr als # Objekte lassen sich nicht von Hand einsetzen",
+  "there is no free place near the robot: remove something first": "nahe beim Roboter ist kein Platz frei: entferne erst etwas",
   "there is nothing called {} in the world any more": "es gibt nichts namens {} mehr in der Welt",
   "{} would overlap the robot: keep # m around it free": "{} würde den Roboter überlappen: lass # m um ihn herum frei",
   "position of obstacle {} overlaps the robot, which starts at #, #; keep # m around it free": "der Ort des Hindernisses {} überlappt den Roboter, der bei #, # startet; lass # m um ihn herum frei",
