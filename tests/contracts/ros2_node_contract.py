@@ -70,14 +70,20 @@ class PeerGraph(Processes, ABC):
 
 
 class DdsDriver(Driver):
-    """Shows signs by the plain program, whatever joins it."""
+    """Shows signs by the plain program, whatever joins it; with ``kept_stop``, it has published a Stop before."""
 
-    def __init__(self, graph: PeerGraph, *options: str, parameters: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self, graph: PeerGraph, *options: str, parameters: Mapping[str, Any] | None = None, kept_stop: bool = False
+    ) -> None:
         namespace = f"/n{next(_numbers)}"
         self.signs, self.cmd_vel, self._peer = f"{namespace}/gesture/hand_sign", f"{namespace}{CMD_VEL}", graph.peer
         self._joy = f"{namespace}/gesture/joy"
         self._is_joystick = (parameters or {}).get("mode") == "joystick"
         record_twists(graph.peer, self.cmd_vel)
+        self.stop = f"{namespace}/stop"
+        if kept_stop:
+            graph.peer.ask("advertise", topic=self.stop, type="Bool", latched=True, depth=1)
+            graph.peer.ask("publish", topic=self.stop, values={"data": True})
         graph.peer.ask("advertise", topic=self.signs, type="String")
         if self._is_joystick:
             graph.peer.ask("advertise", topic=self._joy, type="Joy")
@@ -158,6 +164,17 @@ class Ros2NodeContract(ControlContract):
         driver.expect((0.0, 0.1))
         assert "a message of 12 bytes cannot be read" in driver.process.text
         assert "Traceback" not in driver.process.text
+
+    def test_a_stop_that_was_kept_stops_a_control_that_starts_later(self, graph: PeerGraph) -> None:
+        driver = DdsDriver(graph, parameters={"sign_timeout": 5.0}, kept_stop=True)
+        driver.show("Forward", count=3)
+        eventually(lambda: len(driver.twists) >= 3, what="a twist for each sign")
+        assert set(driver.twists) == {(0.0, 0.0)}
+        graph.peer.ask("publish", topic=driver.stop, values={"data": False})
+        driver.show("Stop", count=5, period_s=0.1)
+        driver.show("Forward")
+        eventually(lambda: driver.twists[-1] == (0.01, 0.0), what="the robot to be driven after the reset")
+        assert "nothing passes" not in driver.process.text
 
     def test_a_late_subscriber_gets_the_description_of_the_robot(self, graph: PeerGraph) -> None:
         topic = "/late/robot_description"

@@ -253,7 +253,7 @@ class Matching:
         assert ours is not None
         node = self._graph.node_of(key)
         if reasons(ours, self._theirs[key]):
-            return explain(ours, self._theirs[key], node)
+            return None if self._is_reached(key) else explain(ours, self._theirs[key], node)
         has_compressed = (f"{ours.topic}{_COMPRESSED}", True) in self._ours
         if self._advised or not has_compressed or not self._loses_images(key):
             return None
@@ -262,6 +262,17 @@ class Matching:
         return (
             f"{name}: {node or UNNAMED} takes raw images, many of which are lost on the way to another "
             f"machine or to Fast DDS: let it take {name}{_COMPRESSED}"
+        )
+
+    def _is_reached(self, key: uuid.UUID) -> bool:
+        """Return whether another endpoint of the same participant exchanges messages with ours on this topic."""
+        ours, theirs = self._ours_for(key), self._theirs[key]
+        assert ours is not None
+        return any(
+            other.bytes[:_PREFIX_BYTES] == key.bytes[:_PREFIX_BYTES]
+            and (end.topic, end.publishes) == (theirs.topic, theirs.publishes)
+            and not reasons(ours, end)
+            for other, end in self._theirs.items()
         )
 
     def _loses_images(self, key: uuid.UUID) -> bool:

@@ -26,7 +26,15 @@ from handsteer.errors import TransportError
 from handsteer.messages import Topic, type_name
 from handsteer.plugins.dds.discovery import Endpoint, Matching, RosGraph
 from handsteer.plugins.dds.network import Network
-from handsteer.plugins.dds.topics import dds_type, opaque_type, reader_qos, service_dds_type, service_qos, writer_qos
+from handsteer.plugins.dds.topics import (
+    dds_type,
+    keeps,
+    opaque_type,
+    reader_qos,
+    service_dds_type,
+    service_qos,
+    writer_qos,
+)
 from handsteer.plugins.ros2.base_transport import Other, Profile
 from handsteer.transports.base import UNNAMED
 from handsteer.transports.encoding import NodeName, dds_type_name, reply_type, request_type, ros_type_name
@@ -84,8 +92,12 @@ class Participant:
         return self._open(DataWriter, name, topic, writer_qos(topic), publishes=True)
 
     def reader(self, name: str, topic: Topic[Any], profile: Profile) -> DataReader[Any]:
-        """Return a new reader of ``topic``, whose full name is ``name``; of two with a name, the last is compared."""
-        return self._open(DataReader, name, topic, reader_qos(topic, profile), publishes=False)
+        """Return a new reader of ``topic``, whose full name is ``name``; of two with a name, the last is compared.
+
+        One of what others have kept, of a topic that is not latched, is not compared.
+        """
+        compares = profile.latched == topic.latched
+        return self._open(DataReader, name, topic, reader_qos(topic, profile), publishes=False, compares=compares)
 
     def service(self, name: str, kind: str) -> tuple[DataReader[Any], DataWriter[Any]]:
         """Return a reader of the requests and a writer of the replies of the service of this full name and type."""
@@ -113,7 +125,7 @@ class Participant:
         """
         # Of this topic only: to find the node of each in a large graph takes tens of milliseconds.
         return [
-            Other(self._graph.node_of(key) or UNNAMED, ros_type_name(end.type), end.publishes)
+            Other(self._graph.node_of(key) or UNNAMED, ros_type_name(end.type), end.publishes, keeps(end.qos))
             for key, end in self._matching.others().items()
             if end.topic == f"rt{name}"
         ]
@@ -132,7 +144,16 @@ class Participant:
         self._topics.clear()
         self._participant = self._domain = None
 
-    def _open(self, kind: Callable[..., E], full_name: str, topic: Topic[Any], qos: Qos, *, publishes: bool) -> E:
+    def _open(
+        self,
+        kind: Callable[..., E],
+        full_name: str,
+        topic: Topic[Any],
+        qos: Qos,
+        *,
+        publishes: bool,
+        compares: bool = True,
+    ) -> E:
         name, message = f"rt{full_name}", type_name(topic.type)
         with self._lock:
             if (name, message) not in self._topics:
@@ -141,7 +162,8 @@ class Participant:
         endpoint = kind(self._participant, dds_topic, qos=qos)
         self._graph.add(endpoint)
         or_type = dds_type_name(type_name(topic.or_type)) if publishes and topic.or_type else None
-        self._matching.add(Endpoint(name, dds_type_name(message), qos, publishes, or_type))
+        if compares:
+            self._matching.add(Endpoint(name, dds_type_name(message), qos, publishes, or_type))
         return endpoint
 
 

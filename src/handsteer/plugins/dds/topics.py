@@ -86,6 +86,11 @@ def describe(qos: Qos) -> str:
     return ", ".join(words)
 
 
+def keeps(qos: Qos) -> bool:
+    """Return whether a publisher keeps messages for later subscribers."""
+    return _rank(qos, "Durability", _DURABILITIES) > 0
+
+
 def misfits(offered: Qos, requested: Qos) -> list[str]:
     """Return why an offer does not satisfy a request, in words; empty if it does (DDS 1.4, section 2.2.3)."""
     found = []

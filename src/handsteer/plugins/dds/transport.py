@@ -46,11 +46,12 @@ class DdsTransport(WireTransport):
         self._addresses = AddressWatch() if self.crosses_network else None
 
     def check(self) -> None:
-        """End the session if the addresses of this machine have been replaced; called regularly.
+        """Hear the Stops that others have kept, and look at this machine's addresses; called regularly.
 
         Raises:
-            TransportError: They have.
+            TransportError: They have been replaced.
         """
+        super().check()
         if self._addresses is not None:
             self._addresses.check()
 

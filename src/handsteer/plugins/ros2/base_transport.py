@@ -15,6 +15,7 @@ from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
 from handsteer.clock import Clock, monotonic
@@ -52,6 +53,7 @@ _LAST_S = 0.2
 _PLAYER = re.compile(r"(/\w+)*/rosbag2_player\w*", re.ASCII)
 _PLAYERS_KNOWN_S = 0.25
 _REMEMBERED = 64
+_LOOK_S = 0.2
 
 log = logging.getLogger(__name__)
 
@@ -169,6 +171,22 @@ class Ros2Transport(BaseTransport):
         super().__init__(set())
         self._node_name = node
         self._clock = clock
+        self._unkept: list[_KeptStops] = []
+        self._looked_s = -math.inf
+
+    def check(self) -> None:
+        """Hear the Stops that others have kept, and log problems of the connection to the graph; called regularly.
+
+        Raises:
+            TransportError: The connection is lost for good.
+        """
+        if time.monotonic() - self._looked_s < _LOOK_S:
+            return
+        self._looked_s = time.monotonic()
+        for kept in tuple(self._unkept):
+            if self._has_keepers(kept.topic):
+                kept.open()
+                self._unkept.remove(kept)
 
     def subscribed_types(self, topic: Topic[Any]) -> set[str]:
         """Return the types of other processes' subscribers of ``topic``; none while this process uses it twice."""
@@ -205,13 +223,16 @@ class Ros2Transport(BaseTransport):
 
         def receive(send: Deliver[M]) -> Callable[[], None]:
             take = Intake(topic, name, self._clock, send, players).take
-            if not (topic.any_reliability and self.connects_by_qos):
+            if not topic.any_reliability:
                 return self._open_reader(name, topic, profile, take)
             once = Once(take).take
-            ends = [self._open_reader(name, topic, replace(profile, reliable=each), once) for each in (True, False)]
+            reliabilities = (True, False) if self.connects_by_qos else (True,)
+            ends = [self._open_reader(name, topic, replace(profile, reliable=each), once) for each in reliabilities]
+            kept = _KeptStops(topic, once, partial(self._open_reader, name, topic, replace(profile, latched=True)))
+            self._unkept.append(kept)
 
             def close() -> None:
-                for end in ends:
+                for end in (*ends, kept.close):
                     end()
 
             return close
@@ -230,6 +251,10 @@ class Ros2Transport(BaseTransport):
     def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
         """Return the types of the subscribers of ``topic`` in other processes."""
 
+    @abstractmethod
+    def _has_keepers(self, topic: Topic[Any]) -> bool:
+        """Return whether a publisher of ``topic`` in another process keeps messages for later subscribers."""
+
 
 def types_of(topic: Topic[Any]) -> set[str]:
     """Return the names of the types that ``topic`` may have: a command is a Twist or a TwistStamped."""
@@ -238,11 +263,19 @@ def types_of(topic: Topic[Any]) -> set[str]:
 
 
 class Other(NamedTuple):
-    """A publisher or subscriber in another process: the full name of its node, and the type of its messages."""
+    """A publisher or subscriber in another process.
+
+    Attributes:
+        node: Full name of its node.
+        type: Type of its messages.
+        publishes: Whether it is a publisher.
+        keeps: Whether a publisher keeps messages for later subscribers.
+    """
 
     node: str
     type: str
     publishes: bool
+    keeps: bool = False
 
 
 class WireTransport(Ros2Transport):
@@ -277,13 +310,6 @@ class WireTransport(Ros2Transport):
         """
         self._services.append(self._open_service(name, kind, respond))
 
-    def check(self) -> None:
-        """Log problems of the connection to the graph; called regularly.
-
-        Raises:
-            TransportError: The connection is lost for good.
-        """
-
     def close(self) -> None:
         """End all publishing, receiving and services; may be called twice."""
         while self._services:
@@ -300,6 +326,9 @@ class WireTransport(Ros2Transport):
 
     def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
         return {other.type for other in self._others(self.topic_name(topic)) if not other.publishes}
+
+    def _has_keepers(self, topic: Topic[Any]) -> bool:
+        return any(other.publishes and other.keeps for other in self._others(self.topic_name(topic)))
 
 
 Take = Callable[[bytes, bytes, float | None], None]
@@ -336,6 +365,52 @@ class Once:
             del taken[at]
         taken.append(message)
         return False
+
+
+class _KeptStops:
+    """Passes on the Stop that a publisher has kept for later subscribers, as one that is transient local does.
+
+    A kept reset ends no Stop of others: only one that the same sender has sent after its Stop is passed on.
+
+    Args:
+        topic: The topic, which has ``stops``.
+        take: As :meth:`Intake.take`.
+        open_reader: Opens a reader of what is kept. It is opened only when such a publisher is there, because all
+            others would warn of a subscriber that gets none of their messages.
+    """
+
+    def __init__(self, topic: Topic[Any], take: Take, open_reader: Callable[[Take], Callable[[], None]]) -> None:
+        self.topic = topic
+        self._pass_on = take
+        self._open_reader = open_reader
+        self._end: Callable[[], None] | None = None
+        self._lock = threading.Lock()
+        self._is_closed = False
+        self._stopped_by, self._stopped_s = b"", math.inf
+
+    def open(self) -> None:
+        """Begin to read."""
+        with self._lock:
+            if not self._is_closed:
+                self._end = self._open_reader(self._take)
+
+    def close(self) -> None:
+        """Stop reading."""
+        with self._lock:
+            self._is_closed = True
+        if self._end is not None:
+            self._end()
+
+    def _take(self, raw: bytes, sender: bytes, sent_s: float | None) -> None:
+        try:
+            stops = self.topic.stops is not None and self.topic.stops(decode(raw, type_name(self.topic.type)))
+        except Exception:
+            return  # the other readers report it
+        if stops:
+            self._stopped_by, self._stopped_s = sender, math.inf if sent_s is None else sent_s
+        elif sent_s is None or sender != self._stopped_by or sent_s <= self._stopped_s:
+            return
+        self._pass_on(raw, sender, sent_s)
 
 
 def are_players(nodes: Sequence[str]) -> bool:

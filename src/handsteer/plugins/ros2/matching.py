@@ -75,15 +75,17 @@ class Matching:
         node = self._node
         for ours in tuple(self._ends.values()):
             look = node.get_subscriptions_info_by_topic if ours.publishes else node.get_publishers_info_by_topic
-            for theirs in look(ours.asked):
-                found = _misfits(ours, theirs)
-                if found and self._is_due(tuple(theirs.endpoint_gid), theirs.node_name, now_s):
+            ends = [(theirs, _misfits(ours, theirs)) for theirs in look(ours.asked)]
+            reached = {node_of(theirs) for theirs, found in ends if not found} - {UNNAMED}
+            for theirs, found in ends:
+                if found and node_of(theirs) not in reached and self._is_due(theirs, now_s):
                     log.warning("%s", _explained(ours, theirs, found))
 
-    def _is_due(self, gid: tuple[int, ...], node: str, now_s: float) -> bool:
+    def _is_due(self, theirs: Any, now_s: float) -> bool:
         """Return whether an end is to be reported now: once, and when its node's name is known, or will not be."""
+        gid = tuple(theirs.endpoint_gid)
         since_s = self._found.setdefault(gid, now_s)
-        if since_s == _REPORTED or (node == _UNKNOWN and now_s - since_s < _NAME_DUE_S):
+        if since_s == _REPORTED or (theirs.node_name == _UNKNOWN and now_s - since_s < _NAME_DUE_S):
             return False
         self._found[gid] = _REPORTED
         return True

@@ -129,7 +129,9 @@ class RclpyTransport(Ros2Transport):
             sent_ns = info.get("source_timestamp", 0)  # not provided by every middleware
             take(raw, b"", sent_ns / 1e9 if sent_ns > 0 else None)
 
-        entity = "best_effort" if topic.any_reliability and not profile.reliable else None
+        entity = None
+        if topic.any_reliability and (profile.latched or not profile.reliable):
+            entity = "transient_local" if profile.latched else "best_effort"
 
         def open_(on_message: Callable[[bytes, Mapping[str, int]], None], qos: QoSProfile) -> Any:
             with _open(name):
@@ -150,8 +152,9 @@ class RclpyTransport(Ros2Transport):
         else:
             live = open_(on_message, qos)
             end = partial(self._node.destroy_subscription, live)
-        # Of two, the second one takes what the first one does not.
-        forget = self._matching.add(End(name, self._unresolved(topic), topic, live.qos_profile, publishes=False))
+        # Of two, the second one takes what the first one does not; one of what is kept takes it from few.
+        end_of = End(name, self._unresolved(topic), topic, live.qos_profile, publishes=False)
+        forget = self._matching.add(end_of) if profile.latched == topic.latched else lambda: None
 
         def close() -> None:
             forget()
@@ -160,12 +163,17 @@ class RclpyTransport(Ros2Transport):
         return close
 
     def check(self) -> None:
-        """Log who is not connected to our publishers and subscriptions, once; called regularly."""
+        """Hear the Stops that others have kept, and log who is not connected to us, once; called regularly."""
+        super().check()
         self._matching.check()
 
     def _subscribed_types(self, topic: Topic[Any]) -> set[str]:
         found = self._node.get_subscriptions_info_by_topic(self._unresolved(topic))
         return {one.topic_type for one in found}
+
+    def _has_keepers(self, topic: Topic[Any]) -> bool:
+        found = self._node.get_publishers_info_by_topic(self._unresolved(topic))
+        return any(one.qos_profile.durability is DurabilityPolicy.TRANSIENT_LOCAL for one in found)
 
     def _unresolved(self, topic: Topic[Any]) -> str:
         """Return the name for rclpy, which expands and remaps it; a topic beneath another is renamed with that."""

@@ -4,6 +4,8 @@ import itertools
 import logging
 import threading
 import time
+from collections import Counter
+from typing import Any
 
 import zenoh
 
@@ -23,6 +25,10 @@ from handsteer.plugins.zenoh.keys import (
 from handsteer.transports.encoding import NodeName, type_hash
 
 _LOOK_AGAIN_S = 1.0
+_CHANGES_KEPT = 10_000
+END_S = 0.5
+"""How long to wait for a thread that reads from Zenoh, in seconds."""
+_MOST_NAMED = 5
 _OPPOSITE = {"publisher": "subscriber", "subscriber": "publisher"}
 
 log = logging.getLogger(__name__)
@@ -137,7 +143,12 @@ class Neighbours:
         self._lock = threading.Lock()
         self._ours: dict[tuple[str, str], tuple[Endpoint, str | None]] = {}
         self._theirs: dict[str, Entity] = {}
-        self._watch = session.liveliness().declare_subscriber(all_tokens(domain), self._note, history=True)
+        self._misfits = Counter[str]()
+        # Zenoh waits for who does not read its other kinds of queue, also while it holds Python's lock.
+        ring: zenoh.handlers.RingChannel[zenoh.Sample] = zenoh.handlers.RingChannel(_CHANGES_KEPT)
+        self._watch: Any = session.liveliness().declare_subscriber(all_tokens(domain), ring, history=True)
+        self._thread = threading.Thread(target=self._run, name="zenoh neighbours", daemon=True)
+        self._thread.start()
 
     def add(self, endpoint: Endpoint, or_type: str | None = None) -> None:
         """Compare our publisher or subscriber, which may change to ``or_type``, with others, now and later."""
@@ -160,6 +171,17 @@ class Neighbours:
     def close(self) -> None:
         """Stop comparing."""
         self._watch.undeclare()
+        # A thread that is inside Zenoh when Python ends aborts the process.
+        self._thread.join(END_S)
+
+    def _run(self) -> None:
+        ring = self._watch.handler
+        while True:
+            try:
+                sample = ring.recv()
+            except zenoh.ZError:  # it has been closed
+                return
+            self._note(sample)
 
     def _note(self, sample: zenoh.Sample) -> None:
         token = str(sample.key_expr)
@@ -181,7 +203,11 @@ class Neighbours:
         if ours is None or theirs.type == or_type:
             return
         if (ours.type, ours.type_hash) != (theirs.type, theirs.type_hash):
-            log.warning("%s", explain(ours, theirs, entity.node))
+            self._misfits[ours.topic] += 1
+            if self._misfits[ours.topic] <= _MOST_NAMED:
+                log.warning("%s", explain(ours, theirs, entity.node))
+            elif self._misfits[ours.topic] == _MOST_NAMED + 1:
+                log.warning("%s: there are more of these, which are not named", ours.topic)
 
 
 def explain(ours: Endpoint, theirs: Endpoint, node: str) -> str:

@@ -20,12 +20,13 @@ from handsteer.messages import Topic, type_name
 from handsteer.plugins.ros2.base_transport import IMAGES, Other, Profile, Take, WireTransport, offered
 from handsteer.plugins.zenoh.configuration import network
 from handsteer.plugins.zenoh.keys import attachment, gid, read_attachment
-from handsteer.plugins.zenoh.member import Member
+from handsteer.plugins.zenoh.member import END_S, Member
 from handsteer.transports.encoding import NodeName
 
 # Zenoh sends on its own threads and does not report when they are done.
 _DELIVER_S = 0.1
 _HEARTBEAT_S = 0.5
+_LEAVE_S = 2.0
 _SERVICE = Profile(reliable=True, latched=False, depth=1000)
 """The profile of ROS 2's parameter services."""
 
@@ -41,15 +42,28 @@ class ZenohTransport(WireTransport):
     def __init__(self, name: NodeName, clock: Clock) -> None:
         super().__init__(name, clock)
         self._member = Member(network(os.environ), name)
+        self._is_closed = False
         # Whether a router forwards to other machines is unknown.
         self.crosses_network = not self._member.is_local
 
     def check(self) -> None:
-        """Log when the router is lost or found again."""
+        """Hear the Stops that others have kept, and log when the router is lost or found again; called regularly."""
+        super().check()
         self._member.watch_router()
 
     def close(self) -> None:
-        """Leave the network; may be called twice."""
+        """Leave the network, in a few seconds at most; may be called twice."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        # Zenoh may wait without end for what a network has left unanswered, such as a router that ends as well.
+        leaving = threading.Thread(target=self._leave, name="zenoh leave", daemon=True)
+        leaving.start()
+        leaving.join(_LEAVE_S)
+        if leaving.is_alive():
+            log.warning("the Zenoh network does not let this node leave: it ends without")
+
+    def _leave(self) -> None:
         super().close()
         self._member.close()
 
@@ -85,6 +99,9 @@ class ZenohTransport(WireTransport):
 
     def _others(self, name: str) -> list[Other]:
         return self._member.neighbours.of(name)
+
+    def _has_keepers(self, topic: Topic[Any]) -> bool:
+        return True  # programs of zenoh do not all announce their publishers, and none warns of subscribers
 
 
 class _Writer:
@@ -161,12 +178,15 @@ class _Reader:
         kind = type_name(topic.type)
         self._subscriber = _subscriber(member.session, member.key(name, kind), profile)
         self._token, _ = member.introduce("subscriber", name, kind, profile)
-        threading.Thread(target=self._run, name=f"zenoh {topic.name}", daemon=True).start()
+        self._thread = threading.Thread(target=self._run, name=f"zenoh {topic.name}", daemon=True)
+        self._thread.start()
 
     def close(self) -> None:
         self._is_closed = True
         self._token.undeclare()
         self._subscriber.undeclare()
+        if self._thread is not threading.current_thread():
+            self._thread.join(END_S)
 
     def _run(self) -> None:
         ring = self._subscriber.handler
