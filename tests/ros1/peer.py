@@ -3,8 +3,9 @@
 It reads orders as lines of JSON from its input and answers each by one line of JSON. ``record`` (topic, package, type,
 fields) starts to note messages, ``record_stamps`` (topic) those of large ones, ``record_diagnostics`` the values of
 nodes; ``get`` (topic) returns what was noted as ``[time_s, [values]]``. ``advertise`` (topic, package, type) comes
-before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count, period_s), ``stream`` of
-images, and ``run_clock`` of simulated time, which ``stop_clock`` ends.
+before ``listeners`` (topic), which returns how many listen, ``publish`` (topic, values, count, period_s),
+``publish_raw`` (topic, raw: hexadecimal bytes), ``stream`` of images, and ``run_clock`` of simulated time, which
+``stop_clock`` ends.
 """
 
 import importlib
@@ -91,6 +92,15 @@ def publish(order: dict[str, Any]) -> bool:
     for _ in range(order.get("count", 1)):
         publisher.publish(message)
         time.sleep(order.get("period_s", 0.0))
+    return True
+
+
+def publish_raw(order: dict[str, Any]) -> bool:
+    """Send bytes that need not be a message of the topic's type."""
+    publisher = publishers[order["topic"]]
+    raw = bytes.fromhex(order["raw"])
+    kind = type("Raw", (publisher.data_class,), {"serialize": lambda self, buffer: buffer.write(raw)})
+    publisher.publish(kind())
     return True
 
 

@@ -2,10 +2,11 @@
 
 import dataclasses
 import functools
+import logging
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -13,6 +14,10 @@ from rosbags.typesys.store import Typestore
 
 from handsteer.errors import TransportError
 from handsteer.messages import Topic, TurtlePose
+
+M = TypeVar("M")
+
+log = logging.getLogger(__name__)
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
 _NODE = re.compile(_TOKEN)
@@ -204,13 +209,37 @@ def encode(message: Any) -> bytes:
     return bytes(types().serialize_cdr(message, message.__msgtype__))
 
 
-def decode(raw: bytes, name: str) -> Any:
+def decode(raw: bytes | memoryview, name: str) -> Any:
     """Decode a message of the type ``name`` (``std_msgs/msg/String``); its arrays are read-only views of ``raw``.
 
     Raises:
         Exception: ``raw`` is not such a message; the type depends on where rosbags fails.
     """
     return types().deserialize_cdr(raw, name)
+
+
+class MessageReader(Generic[M]):
+    """Decodes the messages of a topic; the first of those that cannot be read is logged.
+
+    Args:
+        name: Full name of the topic.
+        decode: Converts bytes to a message, and raises any exception if they are none.
+    """
+
+    def __init__(self, name: str, decode: Callable[[bytes | memoryview], M]) -> None:
+        self._name = name
+        self._decode = decode
+        self._is_logged = False
+
+    def read(self, raw: bytes | memoryview) -> M | None:
+        """Return the message in ``raw``; None if it cannot be read, which must not end the subscription."""
+        try:
+            return self._decode(raw)
+        except Exception as error:
+            if not self._is_logged:
+                log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
+            self._is_logged = True
+            return None
 
 
 def type_hash(name: str) -> str:

@@ -96,7 +96,7 @@ def test_there_on_the_wire_and_back(name: str, data: st.DataObject) -> None:
     ours, wire = data.draw(values(name)), io.BytesIO()
     theirs = ros_class(name)
     to_ros1(ours).serialize(wire)
-    back = from_ros1(ros1_type(name)().deserialize(wire.getvalue()), name)
+    back = from_ros1(ros1_type(name)().deserialize(wire.getvalue()).raw, name)
     assert type(back) is type(ours)
     assert plain(back) == plain(ours)
     again = io.BytesIO()
@@ -120,7 +120,7 @@ def test_a_header_has_its_number() -> None:
     wire = io.BytesIO()
     sent.serialize(wire)
     assert ros_class("sensor_msgs/msg/JointState")().deserialize(wire.getvalue()).header.seq == 7
-    assert plain(from_ros1(sent, "sensor_msgs/msg/JointState")) == plain(ours)
+    assert plain(from_ros1(sent.raw, "sensor_msgs/msg/JointState")) == plain(ours)
 
 
 def test_the_turtle_is_known_without_its_package() -> None:
@@ -140,7 +140,7 @@ def test_fields_that_ros_1_does_not_have_come_back_empty() -> None:
     header = Header(stamp=to_stamp(1.5), frame_id="odom")
     box = Obstacle("crate", "box", (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.5), (0.0, 0.0, 0.0, 1.0))
     sent = world_markers(header, [box])
-    back = from_ros1(to_ros1(sent), "visualization_msgs/msg/MarkerArray").markers[0]
+    back = from_ros1(to_ros1(sent).raw, "visualization_msgs/msg/MarkerArray").markers[0]
     assert (back.ns, back.text, back.scale) == ("world", "", sent.markers[0].scale)
     assert back.texture.header.stamp == Time(0, 0)
     assert (back.uv_coordinates, back.mesh_file.filename, back.texture.data.size) == ([], "", 0)
@@ -157,4 +157,4 @@ def test_a_log_message_is_one_of_ros1_there(level: int) -> None:
     read = theirs().deserialize(ours.raw)
     assert (read.header.seq, read.header.stamp.secs, read.level) == (7, 12, 1 << (level // 10 - 1))
     assert (read.name, read.msg, read.file, read.function) == ("viewer 1", "pressed Stop", "/stop", "stop_pressed")
-    assert from_ros1(ours, "rcl_interfaces/msg/Log") == sent
+    assert from_ros1(ours.raw, "rcl_interfaces/msg/Log") == sent

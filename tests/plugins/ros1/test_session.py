@@ -1,12 +1,14 @@
+import logging
 import threading
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
 from handsteer.errors import TransportError
-from handsteer.messages import GESTURE_JOY, STOP, STOPPED, Image, Joy, Topic
+from handsteer.messages import GESTURE_JOY, HAND_SIGN, STOP, STOPPED, Image, Joy, Topic, type_name
 from handsteer.nodes.base import Node
 from handsteer.testing.transport_contract import SessionContract, eventually
 from handsteer.transports import join
@@ -98,6 +100,38 @@ class TestRos1(SessionContract):
         assert eventually(lambda: came[1:] == [(0.0, True)]), came
         show(1.0, held=True, delay_s=0.0)
         assert eventually(lambda: came[2:] == [(1.0, False)])
+
+    @pytest.mark.parametrize(
+        ("topic", "raw"),
+        [
+            pytest.param(HAND_SIGN, "03000000e4f6fc", id="no text"),
+            pytest.param(GESTURE_JOY, "00" * 16 + "02000000" + "00" * 4, id="truncated"),
+            pytest.param(GESTURE_JOY, "", id="empty"),
+        ],
+    )
+    def test_messages_that_cannot_be_read_are_left_out_and_logged_once(
+        self,
+        graph: Ros1Graph,
+        transport: Transport,
+        caplog: pytest.LogCaptureFixture,
+        topic: Topic[Any],
+        raw: str,
+    ) -> None:
+        heard: list[Received[Any]] = []
+        transport.subscribe("listener", topic, heard.append)
+        package, _, kind = type_name(topic.type).split("/")
+        peer = graph.peer("__name:=odd")
+        peer.ask("advertise", topic=topic.name, package=package, type=kind)
+        assert eventually(lambda: peer.ask("listeners", topic=topic.name) > 0)
+        for _ in range(5):
+            peer.ask("publish_raw", topic=topic.name, raw=raw)
+        peer.ask("publish", topic=topic.name, values={})
+        assert eventually(lambda: len(heard) > 0)
+        assert len(heard) == 1
+        lines = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+        assert len(lines) == 1, lines
+        assert lines[0].startswith(f"{topic.name}: a message of {len(raw) // 2} bytes cannot be read")
+        peer.kill()
 
     def test_a_process_has_one_name(self, session: Session) -> None:
         with pytest.raises(TransportError, match=r"is the ROS node /tests already.*one a process.*process of its own"):

@@ -74,15 +74,15 @@ def to_ros1(message: Any, number: int = 0) -> RawMessage:
     return kind(b"".join((struct.pack("<I", number), raw[_SEQ_BYTES:])) if kind.has_header else raw)
 
 
-def from_ros1(message: RawMessage, name: str) -> Any:
-    """Return rospy's message as our type ``name``; its arrays are views of the bytes, and read-only.
+def from_ros1(raw: bytes | memoryview, name: str) -> Any:
+    """Return the message in the bytes of rospy's as our type ``name``; its arrays are read-only views of ``raw``.
 
     Raises:
-        Exception: It is not such a message; the type depends on where rosbags fails.
+        Exception: ``raw`` is not such a message; the type depends on where rosbags fails.
     """
     if name == _LOG:
-        return _from_ros1_log(_ros1_types().deserialize_ros1(message.raw, _ROS1_LOG))
-    return _read_types().deserialize_ros1(message.raw, name)
+        return _from_ros1_log(_ros1_types().deserialize_ros1(raw, _ROS1_LOG))
+    return _read_types().deserialize_ros1(raw, name)
 
 
 @functools.cache

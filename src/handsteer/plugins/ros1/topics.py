@@ -22,6 +22,7 @@ from handsteer.plugins.ros1.conversion import from_ros1, ros1_type, to_ros1
 from handsteer.plugins.ros1.master import SystemState
 from handsteer.timeouts import HEAR_STOP_S
 from handsteer.transports.base import Deliver, Received
+from handsteer.transports.encoding import MessageReader
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
 from handsteer.transports.timing import StaleMessageFilter, capture_time
 
@@ -112,8 +113,12 @@ class Ros1Transport(BaseTransport):
             if self._was_stopped and topic.name == STOPPED.name:
                 send(Received(topic.type(data=True)))  # type: ignore[call-arg]
 
+            reader: MessageReader[M] = MessageReader(name, lambda raw: from_ros1(raw, kind))
+
             def on_message(theirs: Any) -> None:
-                message = from_ros1(theirs, kind)
+                message = reader.read(theirs.raw)
+                if message is None:
+                    return
                 captured_s = capture_time(message, self._clock)
                 is_kept = kept is not None and kept.has(theirs)
                 by_player = captured_s is not None and _is_player(theirs)

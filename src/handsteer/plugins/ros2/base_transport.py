@@ -35,7 +35,7 @@ from handsteer.messages import (
 )
 from handsteer.timeouts import STALE_S
 from handsteer.transports.base import Deliver, Received
-from handsteer.transports.encoding import NodeName, compile_type, decode, encode
+from handsteer.transports.encoding import MessageReader, NodeName, compile_type, decode, encode
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
 from handsteer.transports.timing import StaleMessageFilter, StopOrder, capture_time
 
@@ -462,7 +462,9 @@ class Intake(Generic[M]):
         self._send = send
         self._stale = None if topic.lifespan_s is None else StaleMessageFilter(topic.lifespan_s)
         self._order = StopOrder() if topic.stops is not None and topic.lifespan_s is None else None
-        self._was_late = self._is_broken = False
+        kind = type_name(topic.type)
+        self._reader: MessageReader[M] = MessageReader(name, lambda raw: decode(raw, kind))
+        self._was_late = False
 
     def take(self, raw: bytes, sender: bytes, sent_s: float | None) -> None:
         """Process one message.
@@ -473,13 +475,8 @@ class Intake(Generic[M]):
             sent_s: Time of sending, in seconds of the sender's clock; None if unknown.
         """
         is_late = self._is_late(sender, sent_s)
-        try:
-            message = decode(raw, type_name(self._topic.type))
-        except Exception as error:
-            # Invalid messages must not end the subscription.
-            if not self._is_broken:
-                log.warning("%s: a message of %d bytes cannot be read: %s", self._name, len(raw), error)
-            self._is_broken = True
+        message = self._reader.read(raw)
+        if message is None:
             return
         stops = self._topic.stops is not None and self._topic.stops(message)
         if self._is_overtaken(sender, sent_s, stops=stops):
