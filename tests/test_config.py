@@ -119,6 +119,11 @@ def test_robots_have_names_that_differ(robots: list[str]) -> None:
         load(None, {"control": {"robots": robots}})
 
 
+def test_no_robot_is_called_as_the_following_one_is_selected() -> None:
+    with pytest.raises(ConfigError, match=r"control.robots: .* should not name a robot 'next': on /select_robot"):
+        load(None, {"control": {"robots": ["r1", "next"]}})
+
+
 def test_old_names_still_count_with_one_warning(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

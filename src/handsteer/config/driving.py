@@ -40,6 +40,8 @@ else:
     SignEffect = Literal[(*get_args(Action), *ACTIONS.names())]
 SIGN_EFFECTS: tuple[Any, ...] = (*get_args(Action), *ACTIONS.names())
 """What signs can do: the built-in actions, and those of plug-ins."""
+NEXT = "next"
+"""On ``/select_robot``, the following robot instead of the name of one."""
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 
@@ -198,6 +200,8 @@ class ControlConfig(Section):
         wrong = [name for name in robots if not _NAMESPACE.fullmatch(name) or robots.count(name) > 1]
         if wrong:
             raise ValueError(f"should name each robot once, with letters, digits and _; {wrong[0]!r} does not")
+        if NEXT in robots:
+            raise ValueError(f"should not name a robot {NEXT!r}: on /select_robot it selects the following one")
         return robots
 
     @field_validator("actions")

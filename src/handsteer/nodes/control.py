@@ -7,6 +7,7 @@ from typing import Any
 
 from handsteer.clock import Clock, SimulatedClock
 from handsteer.config import CollisionMonitorConfig, Config, ControlConfig, JoyConfig, assist_of
+from handsteer.config.driving import NEXT
 from handsteer.control import Control
 from handsteer.control.actions import AddedActions
 from handsteer.control.assist import assist_named
@@ -37,7 +38,7 @@ from handsteer.nodes.auditing import ControlAudit
 from handsteer.nodes.base import Node
 from handsteer.nodes.collision_monitor import CollisionMonitor, MeasuredVelocity
 from handsteer.nodes.joysticks import Joysticks
-from handsteer.nodes.selection import NEXT, Selection
+from handsteer.nodes.selection import Selection
 from handsteer.nodes.status import ControlStatus
 from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.timing import CALM_S, LatencyLog, StallGuard

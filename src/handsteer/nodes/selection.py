@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from handsteer.config.driving import NEXT
 from handsteer.errors import quoted
 from handsteer.messages import SELECT_ROBOT, SELECTED_ROBOT, String, Topic
 from handsteer.nodes.base import Node
@@ -14,9 +15,6 @@ from handsteer.transports.commands import Commands
 log = logging.getLogger(__name__)
 
 _LAST_ZEROS = 10
-
-NEXT = "next"
-"""Accepted by :meth:`Selection.select` instead of a name."""
 
 
 class Selection:
