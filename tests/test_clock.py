@@ -5,6 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.clock import RealClock, SimulatedClock, SteppedClock, WallClock, to_seconds, to_stamp
+from handsteer.messages import Time
+from handsteer.transports.encoding import decode, encode
 
 
 def test_stamps_of_the_real_clock_are_unix_time() -> None:
@@ -20,11 +22,27 @@ def test_a_stepped_clock_moves_forward_only() -> None:
     assert to_seconds(clock.stamp(2.5)) == 2.5
 
 
-@given(st.floats(0, 4e9))
+@given(st.floats(0, 2**31 - 1))
 def test_stamps_keep_nanoseconds_within_a_second(seconds: float) -> None:
     stamp = to_stamp(seconds)
     assert 0 <= stamp.nanosec < 1_000_000_000
     assert to_seconds(stamp) == pytest.approx(seconds, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "stamp"),
+    [
+        (2.0**31 - 1, Time(2**31 - 1, 0)),
+        (2.0**31, Time(2**31 - 1, 999_999_999)),
+        (2.0**31 + 5, Time(2**31 - 1, 999_999_999)),
+        (1e12, Time(2**31 - 1, 999_999_999)),
+        (-5.5, Time(-6, 500_000_000)),
+        (-1e12, Time(-(2**31), 0)),
+    ],
+)
+def test_each_time_has_a_stamp_that_can_be_sent(seconds: float, stamp: Time) -> None:
+    assert to_stamp(seconds) == stamp
+    assert decode(encode(stamp), "builtin_interfaces/msg/Time") == stamp
 
 
 class Simulator:
@@ -50,6 +68,18 @@ def test_simulated_time_is_followed() -> None:
     assert simulator.clock.now() == pytest.approx(51.0)
     assert simulator.clock.stamp(50.5) == to_stamp(50.5)
     assert simulator.clock.time_of(to_stamp(50.5)) == pytest.approx(50.5)
+
+
+@pytest.mark.parametrize("last_s", [2.0**31 - 1, to_seconds(Time(2**31 - 1, 999_999_999))])
+def test_the_last_time_that_a_stamp_holds_has_one_and_those_after_it(last_s: float) -> None:
+    simulator = Simulator()
+    simulator.clock.tell(last_s)
+    for _ in range(3):
+        simulator.real_s += 1.0
+        encode(simulator.clock.stamp(simulator.clock.now()))
+    assert simulator.clock.stamp(simulator.clock.now()).sec == 2**31 - 1
+    simulator.clock.tell(5.0)
+    assert simulator.clock.stamp(simulator.clock.now()) == to_stamp(5.0)
 
 
 def test_when_simulated_time_stands_seconds_pass_and_frames_grow_old() -> None:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from handsteer.messages import Time
 
 _NS_PER_S = 1_000_000_000
+# Seconds in a ROS time are an int32.
+_FIRST_NS, _LAST_NS = -(2**31) * _NS_PER_S, 2**31 * _NS_PER_S - 1
 _LOOK_AGAIN_S = 0.005
 # Simulators publish their time 10 to 1000 times a second.
 _STANDS_AFTER_S = 0.15
@@ -298,14 +300,19 @@ def clock_change(set_by_s: float) -> str:
 
 
 def to_stamp(seconds: float) -> "Time":
-    """Return ``seconds`` (>= 0) as a ROS time, rounded to a nanosecond."""
+    """Return ``seconds`` (>= 0) as a ROS time, rounded to a nanosecond; the nearest one if none holds so many."""
     # Reading a video needs a clock but no messages, which take longer to load than all of OpenCV.
     from handsteer.messages import Time  # noqa: PLC0415
 
-    nanoseconds = round(seconds * _NS_PER_S)
+    nanoseconds = max(_FIRST_NS, min(round(seconds * _NS_PER_S), _LAST_NS))
     return Time(sec=nanoseconds // _NS_PER_S, nanosec=nanoseconds % _NS_PER_S)
 
 
 def to_seconds(stamp: "Time") -> float:
     """Return a ROS time in seconds."""
     return stamp.sec + stamp.nanosec / _NS_PER_S
+
+
+def is_time(sec: int, nanosec: int) -> bool:
+    """Return whether these numbers, as a message has them, are a time of ROS that is not before its start, 0."""
+    return 0 <= sec <= _LAST_NS // _NS_PER_S and 0 <= nanosec < _NS_PER_S

@@ -209,6 +209,10 @@ class Ros2NodeContract(ControlContract):
         words = ("-r", "__ns:=/simulated", "-p", "use_sim_time:=true")
         camera = graph.node("camera", *VIRTUAL, name="/simulated/my_camera", ros=words)
         eventually(lambda: peer.ask("listeners", topic="/clock") > 0)
+        for values in ({"clock.sec": 2**31 - 1, "clock.nanosec": 2**32 - 1}, {"clock.sec": -1}):
+            peer.ask("publish", topic="/clock", values=values, count=5, period_s=0.05)
         peer.ask("run_clock", from_s=1000.0, seconds=30.0)
         eventually(lambda: [v for _, (v,) in peer.ask("get", topic=topic) if 1000.0 < v < 1040.0], 15.0)
         assert camera.running
+        assert camera.text.count("/clock: a message with ") == 1
+        assert "Traceback" not in camera.text

@@ -122,7 +122,7 @@ def cdr(kind: str, values: dict[str, Any]) -> bytes:
     if kind == "Bool":
         return HEADER + struct.pack("<?", values["data"])
     if kind == "Clock":
-        return HEADER + struct.pack("<iI", int(values["s"]), int(values["s"] % 1 * 1e9))
+        return HEADER + struct.pack("<iI", values["clock.sec"], values.get("clock.nanosec", 0))
     if kind == "Joy":
         axes, buttons = values["axes"], values["buttons"]
         header = struct.pack("<iII", 0, 0, 1) + bytes(4)  # no frame: one zero byte, and three up to the next number
@@ -261,7 +261,8 @@ def run_clock(order: dict[str, Any]) -> bool:
     def run() -> None:
         began_s = time.monotonic()
         while (passed_s := time.monotonic() - began_s) < order["seconds"]:
-            send("/clock", cdr("Clock", {"s": order["from_s"] + passed_s}))
+            now_s = order["from_s"] + passed_s
+            send("/clock", cdr("Clock", {"clock.sec": int(now_s), "clock.nanosec": int(now_s % 1 * 1e9)}))
             time.sleep(0.01)
 
     threading.Thread(target=run, daemon=True).start()

@@ -89,6 +89,22 @@ def test_frames_are_old_when_the_clock_stands(simulated: Ros1Graph, peer: Peer) 
     eventually(lambda: set(signs()[-5:]) == {"NONE"}, what="frames to grow old")
 
 
+def test_what_is_no_time_is_ignored(simulated: Ros1Graph, peer: Peer) -> None:
+    robot = simulated.node("robot", name="/robot")
+    clock_heard(simulated, "/robot")
+    eventually(lambda: stamps(peer) and peer.ask("listeners", topic="/clock") > 0)
+    for _ in range(5):
+        peer.ask("publish_raw", topic="/clock", raw="ff" * 8)
+        peer.ask("publish_raw", topic="/clock", raw="ffffff7fffffffff")
+    peer.ask("run_clock", from_s=START_S, rate=1.0)
+    eventually(lambda: START_S < stamps(peer)[-1][1] < START_S + 60.0)
+    assert robot.text.count("/clock: a message with ") == 1
+    assert "Traceback" not in robot.text
+    peer.ask("stop_clock")
+    robot.signal(signal.SIGTERM)
+    assert robot.code() == 0
+
+
 def test_a_robot_may_tell_the_time_and_does_not_follow_itself(simulated: Ros1Graph, peer: Peer) -> None:
     peer.ask("record", topic="/clock", package="rosgraph_msgs", type="Clock", fields=["clock"])
     robot = simulated.node("robot", "_publish_clock:=true", name="/robot")

@@ -5,7 +5,7 @@ import math
 from collections import OrderedDict
 from typing import Any
 
-from handsteer.clock import Clock, ClockWatch, SimulatedClock, to_seconds
+from handsteer.clock import Clock, ClockWatch, SimulatedClock, is_time, to_seconds
 from handsteer.messages import NO_STAMP, Time
 
 # A sender's clock that is set back by a second is trusted again after a minute and a half; delays are shorter.
@@ -117,6 +117,21 @@ class StopOrder:
         if stops and prompt_s > self._stopped_s:
             self._stopped_by, self._stopped_s = sender, prompt_s
         return not stops and sender != self._stopped_by and prompt_s < self._stopped_s
+
+
+class ClockTimes:
+    """Recognises what is no time on ``/clock``; the first such message is logged."""
+
+    def __init__(self) -> None:
+        self._is_logged = False
+
+    def has(self, sec: int, nanosec: int) -> bool:
+        """Return whether this is a time; other messages have to be ignored."""
+        is_valid = is_time(sec, nanosec)
+        if not (is_valid or self._is_logged):
+            self._is_logged = True
+            log.warning("/clock: a message with %d s and %d ns is no time: such messages are ignored", sec, nanosec)
+        return is_valid
 
 
 class ClockMonitor:

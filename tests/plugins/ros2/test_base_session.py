@@ -4,9 +4,10 @@ from typing import Any
 import pytest
 
 from handsteer.errors import TransportError
-from handsteer.messages import Time
-from handsteer.plugins.ros2.base_session import RosoutHandler
+from handsteer.messages import CLOCK, ClockMessage, Time
+from handsteer.plugins.ros2.base_session import Ros2Session, RosoutHandler
 from handsteer.transports.encoding import decode, encode
+from handsteer.transports.in_process import InProcessTransport
 
 
 @pytest.fixture
@@ -74,3 +75,31 @@ def test_only_the_newest_wait(handler: RosoutHandler, log: logging.Logger) -> No
     sent: list[Any] = []
     handler.send(sent.append)
     assert [message.msg for message in sent] == [str(number) for number in range(900, 1000)]
+
+
+class Wire(InProcessTransport):
+    """Messages of this process, where a session expects those of a network."""
+
+    def check(self) -> None:
+        pass
+
+    def flush(self, timeout_s: float) -> None:
+        pass
+
+
+def test_what_is_no_time_on_clock_is_ignored_and_logged_once(caplog: pytest.LogCaptureFixture) -> None:
+    wire: Any = Wire()
+    session = Ros2Session("my_camera", ["--ros-args", "-p", "use_sim_time:=true"], lambda _name, _clock: wire)
+    clock = wire.advertise("simulator", CLOCK)
+    clock.publish(ClockMessage(Time(sec=7, nanosec=500_000_000)))
+    for sec, nanosec in ((2**31 - 1, 2**32 - 1), (8, 10**9), (-1, 0)):
+        clock.publish(ClockMessage(Time(sec=sec, nanosec=nanosec)))
+        assert session.clock.now() < 60.0
+    assert session.clock.stamp(session.clock.now()) == Time(sec=7, nanosec=500_000_000)
+    assert caplog.messages == [
+        "/clock: a message with 2147483647 s and 4294967295 ns is no time: such messages are ignored"
+    ]
+    clock.publish(ClockMessage(Time(sec=2**31 - 1, nanosec=0)))
+    assert session.clock.stamp(session.clock.now()) == Time(sec=2**31 - 1, nanosec=0)
+    assert not session.wait(0.0)
+    session.close()

@@ -27,7 +27,7 @@ from handsteer.plugins.ros1 import course
 from handsteer.plugins.ros1.last_stop import LastStop
 from handsteer.plugins.ros1.master import Lifeline, Master, MasterGone
 from handsteer.plugins.ros1.topics import Ros1Transport
-from handsteer.transports.timing import ClockMonitor
+from handsteer.transports.timing import ClockMonitor, ClockTimes
 
 log = logging.getLogger(__name__)
 
@@ -118,8 +118,13 @@ class Ros1Session(Session):
     def _make_clock(self) -> Clock:
         if not rospy.get_param("/use_sim_time", False):
             return WallClock()
-        clock = SimulatedClock()
-        rospy.Subscriber("/clock", ClockMessage, lambda message: clock.tell(message.clock.to_sec()), queue_size=1)
+        clock, times = SimulatedClock(), ClockTimes()
+
+        def tell(message: Any) -> None:
+            if times.has(message.clock.secs, message.clock.nsecs):
+                clock.tell(message.clock.to_sec())
+
+        rospy.Subscriber("/clock", ClockMessage, tell, queue_size=1)
         return clock
 
     def _watch(self) -> None:

@@ -9,14 +9,14 @@ from typing import Any
 
 from handsteer.clock import Clock, SimulatedClock, WallClock, to_seconds
 from handsteer.errors import HandsteerError, TransportError
-from handsteer.messages import CLOCK, Log, Time, Topic
+from handsteer.messages import CLOCK, ClockMessage, Log, Time, Topic
 from handsteer.parameters import NodeParameters
 from handsteer.plugins.ros2.arguments import parse_arguments
 from handsteer.plugins.ros2.base_transport import WireTransport
 from handsteer.plugins.ros2.parameter_services import PARAMETER_EVENTS, ParameterServices
-from handsteer.transports.base import Publisher, Session
+from handsteer.transports.base import Publisher, Received, Session
 from handsteer.transports.encoding import NodeName, decode, encode, identify, request_type
-from handsteer.transports.timing import ClockMonitor
+from handsteer.transports.timing import ClockMonitor, ClockTimes
 
 _DELIVER_S = 0.2
 _LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
@@ -167,7 +167,14 @@ class Ros2Session(Session):
             self._rosout.send(self._logs.publish)
 
     def _follow(self, clock: SimulatedClock) -> None:
-        self.transport.subscribe("clock", CLOCK, lambda received: clock.tell(to_seconds(received.message.clock)))
+        times = ClockTimes()
+
+        def tell(received: Received[ClockMessage]) -> None:
+            stamp = received.message.clock
+            if times.has(stamp.sec, stamp.nanosec):
+                clock.tell(to_seconds(stamp))
+
+        self.transport.subscribe("clock", CLOCK, tell)
 
 
 def _respond(kind: str, answer: Callable[[Any], Any], request: bytes) -> bytes:

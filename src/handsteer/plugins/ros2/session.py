@@ -25,13 +25,14 @@ from rclpy.utilities import remove_ros_args
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import ConfigError, HandsteerError, TransportError
+from handsteer.messages import CLOCK
 from handsteer.parameters import Description, NodeParameters, Value
 from handsteer.plugins.ros2.arguments import nested
 from handsteer.plugins.ros2.parameter_services import TYPES, descriptor
 from handsteer.plugins.ros2.topics import RclpyTransport, is_opening, ros_class
 from handsteer.transports.base import Call, Managed, Session
 from handsteer.transports.encoding import encode
-from handsteer.transports.timing import ClockMonitor
+from handsteer.transports.timing import ClockMonitor, ClockTimes
 
 _DELIVER_S = 0.2
 _LEAVE_S = 2.0
@@ -210,6 +211,11 @@ def _answer(call: Call, _request: Any, reply: Any) -> Any:
     return reply
 
 
+def _tell(times: ClockTimes, tell: Callable[[Any], None], message: Any) -> None:
+    if times.has(message.clock.sec, message.clock.nanosec):
+        tell(message)
+
+
 class LateManagedNode(LifecycleNodeMixin, Node):  # type: ignore[misc]
     """A node of rclpy that becomes a managed one only by :meth:`manage`, after its parameters are known."""
 
@@ -225,6 +231,14 @@ class LateManagedNode(LifecycleNodeMixin, Node):  # type: ignore[misc]
         self.emptied |= {each[0] for each in parameters if len(each) > 1 and each[1] is None}
         known = [each for each in parameters if each[0] not in self.emptied]
         return super().declare_parameters(namespace, known, ignore_override)
+
+    def create_subscription(
+        self, kind: Any, topic: str, callback: Callable[[Any], None], *args: Any, **options: Any
+    ) -> Any:
+        """Subscribe to ``topic``; rclpy's own clock, which takes the times of ``/clock``, raises for what is none."""
+        if topic == CLOCK.name:
+            callback = partial(_tell, ClockTimes(), callback)
+        return super().create_subscription(kind, topic, callback, *args, **options)
 
     def manage(self, node: Managed) -> None:
         """Offer the services of ``ros2 lifecycle``, which activate and deactivate ``node``."""
