@@ -120,7 +120,7 @@ class StopOrder:
 
 
 class ClockTimes:
-    """Recognises what is no time on ``/clock``; the first such message is logged."""
+    """Recognises what is not a valid time on ``/clock``; the first such message is logged."""
 
     def __init__(self) -> None:
         self._is_logged = False
@@ -130,7 +130,9 @@ class ClockTimes:
         is_valid = is_time(sec, nanosec)
         if not (is_valid or self._is_logged):
             self._is_logged = True
-            log.warning("/clock: a message with %d s and %d ns is no time: such messages are ignored", sec, nanosec)
+            log.warning(
+                "/clock: a message with %d s and %d ns is not a valid time: such messages are ignored", sec, nanosec
+            )
         return is_valid
 
 

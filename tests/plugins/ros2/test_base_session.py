@@ -97,7 +97,7 @@ def test_what_is_no_time_on_clock_is_ignored_and_logged_once(caplog: pytest.LogC
         assert session.clock.now() < 60.0
     assert session.clock.stamp(session.clock.now()) == Time(sec=7, nanosec=500_000_000)
     assert caplog.messages == [
-        "/clock: a message with 2147483647 s and 4294967295 ns is no time: such messages are ignored"
+        "/clock: a message with 2147483647 s and 4294967295 ns is not a valid time: such messages are ignored"
     ]
     clock.publish(ClockMessage(Time(sec=2**31 - 1, nanosec=0)))
     assert session.clock.stamp(session.clock.now()) == Time(sec=2**31 - 1, nanosec=0)
