@@ -7,13 +7,13 @@ verb names the modules it works with by :func:`loads`.
 import gc
 import importlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from cyclopts import App, CycloptsError, Parameter, UnknownCommandError, UnknownOptionError
+from cyclopts import App, CoercionError, CycloptsError, Parameter, UnknownCommandError, UnknownOptionError
 
 from handsteer import __version__
 from handsteer.cli import signals
@@ -21,6 +21,19 @@ from handsteer.cli.options import take_parameters, with_section
 from handsteer.cli.running import exit_code, fail, set_up_logging
 from handsteer.errors import did_you_mean
 
+_WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
+
+
+def _whole(_kind: object, tokens: Sequence[Any]) -> int:
+    (token,) = tokens
+    if not _WHOLE.fullmatch(token.value):
+        raise CoercionError(token=token, target_type=int)
+    return int(token.value)
+
+
+Whole = Annotated[int, Parameter(converter=_whole)]
+"""A whole number; cyclopts itself rounds any other."""
+MaybeWhole = Annotated[int | None, Parameter(converter=_whole)]
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 Parameters = Annotated[dict[str, Any] | None, Parameter(parse=False)]
 """Options with the full name of a parameter, such as --control.max-linear, by section."""
@@ -50,7 +63,7 @@ class PageOptions:
     """
 
     host: str | None = None
-    port: int | None = None
+    port: MaybeWhole = None
     token: Flag = False
 
     def parameters(self) -> dict[str, object]:

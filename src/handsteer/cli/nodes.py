@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from handsteer.cli.app import PageOptions, Parameters, Transport, loads
+from handsteer.cli.app import PageOptions, Parameters, Transport, Whole, loads
 from handsteer.cli.running import say, settings, signals_ignored
 from handsteer.errors import ConfigError, did_you_mean
 
@@ -135,7 +135,7 @@ def _run(
     return run(verb, transport, words, lambda service: settings(file, given, shorthand, service=service))
 
 
-def robots(count: int, /, *, transport: str, world: str | None = None) -> int:
+def robots(count: Whole, /, *, transport: str, world: str | None = None) -> int:
     """Simulate several robots, /r1, /r2 and so on, each in its own process and world.
 
     For example:

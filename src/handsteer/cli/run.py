@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from cyclopts import Parameter
 
-from handsteer.cli.app import ConfigFile, Flag, PageOptions, Parameters, loads
+from handsteer.cli.app import ConfigFile, Flag, MaybeWhole, PageOptions, Parameters, loads
 from handsteer.cli.running import default_file
 from handsteer.cli.running import settings as make_settings
 from handsteer.errors import ConfigError, did_you_mean
@@ -86,7 +86,7 @@ def run(
     page: PageOptions = PageOptions(),  # noqa: B008 - it is frozen
     mode: Mode = Mode(),
     record: Path | None = None,
-    foxglove: int | None = None,
+    foxglove: MaybeWhole = None,
     json: Flag = False,
     config_file: ConfigFile = None,
     parameters: Parameters = None,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from cyclopts import Parameter
 
-from handsteer.cli.app import ConfigFile, Parameters, loads
+from handsteer.cli.app import ConfigFile, MaybeWhole, Parameters, Whole, loads
 from handsteer.cli.running import check_writable, say, settings, table
 from handsteer.errors import BenchError, needing
 
@@ -94,10 +94,10 @@ def bench(
     course: Words = None,
     interface: Words = None,
     all: bool = False,
-    seeds: int | None = None,
-    first_seed: int = 0,
+    seeds: MaybeWhole = None,
+    first_seed: Whole = 0,
     varied: Varied = Varied(),
-    jobs: int | None = None,
+    jobs: MaybeWhole = None,
     json: Path | None = None,
     plots: Path | None = None,
     config_file: ConfigFile = None,

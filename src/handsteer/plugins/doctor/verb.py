@@ -3,14 +3,14 @@
 import json as json_format
 from typing import TYPE_CHECKING
 
-from handsteer.cli.app import Flag, loads
+from handsteer.cli.app import Flag, Whole, loads
 
 if TYPE_CHECKING:
     from handsteer.plugins.doctor.examine import Finding
 
 
 @loads("handsteer.plugins.doctor.examine")
-def doctor(*, port: int = 8080, json: Flag = False) -> int:
+def doctor(*, port: Whole = 8080, json: Flag = False) -> int:
     """Check what works on this machine; exit code 1 if something required is missing.
 
     For example:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
+from handsteer.cli.app import ConfigFile, Flag, Parameters, Whole, loads
 from handsteer.cli.running import check_writable, settings
 from handsteer.errors import DatasetError
 
@@ -32,7 +32,7 @@ class Takes:
         Record while the space key is held, without a countdown.
     """
 
-    takes: int = 5
+    takes: Whole = 5
     take_time: float = 3.0
     countdown: float = 3.0
     hold: Flag = False
