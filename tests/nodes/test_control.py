@@ -769,24 +769,27 @@ def test_odometry_that_falls_silent_stops_the_ramp_and_disarms(arming: bool, rep
     assert bench.last() == (0.01, 0)
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+@pytest.mark.parametrize("stands", [False, True])
 @pytest.mark.parametrize("where", ["x", "w"])
-def test_a_pose_that_is_not_a_number_hides_no_robot_that_stands(where: str) -> None:
+def test_odometry_whose_pose_is_not_a_number_counts_as_none(where: str, *, stands: bool, value: float) -> None:
     bench = ControlBench(arming=True)
     odom = bench.transport.advertise("robot", ODOM)
 
     def show(sign: str, count: int, *, is_number: bool) -> None:
         for _ in range(count):
-            message = odometry(twist(0.0, 0.0), bench.clock.stamp(1.0 + bench.clock.now()))
+            moves = twist(0.0, 0.0) if stands or not bench.twists else bench.twists[-1]
+            message = odometry(moves, bench.clock.stamp(1.0 + bench.clock.now()))
             pose = message.pose.pose
             if not is_number:
-                setattr(pose.position if where == "x" else pose.orientation, where, float("nan"))
+                setattr(pose.position if where == "x" else pose.orientation, where, value)
             odom.publish(message)
             bench.show(sign)
 
     show("NONE", 60, is_number=True)
     show("Forward", 90, is_number=False)
     assert bench.last() == (0, 0)
-    assert bench.control._report().message.endswith("to begin (the robot did not follow its commands)")
+    assert bench.control._report().message.endswith("to begin (the robot's odometry has stopped)")
 
 
 def test_nothing_ramps_while_no_robot_listens() -> None:

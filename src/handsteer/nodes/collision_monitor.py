@@ -36,13 +36,14 @@ class MeasuredVelocity:
     def read(self, odometry: Odometry) -> Velocity | None:
         """Return the robot's velocity; None if it moves but its twist does not give the velocity.
 
-        One that no robot has, above 25 m/s or 60 rad/s, is not finite.
+        One that no robot has, above 25 m/s or 60 rad/s, is not finite; nor is that with a pose that is not finite,
+        because odometry that is wrong in one part is not to be believed in the other.
         """
         twist, pose = odometry.twist.twist, odometry.pose.pose
         velocity = Velocity(twist.linear.x, twist.angular.z)
-        if velocity != velocity.clamped(_FASTEST.linear_mps, _FASTEST.angular_radps):
+        if velocity != velocity.clamped(_FASTEST.linear_mps, _FASTEST.angular_radps) or not _is_finite(pose):
             return _NOT_VALID
-        has_moved, self._pose = self._pose not in (None, pose) and _is_finite(pose), pose
+        has_moved, self._pose = self._pose not in (None, pose), pose
         return None if velocity.is_zero and has_moved else velocity
 
 
