@@ -55,7 +55,7 @@ class Drive:
         self.trace = Trace(self.graph)
         self.graph.cameras.find()
         if record is not None:
-            self.graph.record(record)
+            self.graph.record(str(record))
 
     def run(self, duration_s: float) -> list[float]:
         """Run for some seconds; return the commanded speeds."""

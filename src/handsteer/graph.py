@@ -273,7 +273,7 @@ class Graph:
             while any([node.spin_once() for node in reversed(self.nodes)]):
                 pass
 
-    def record(self, path: Path, by: str = _NAME) -> None:
+    def record(self, path: Path | str, by: str = _NAME) -> None:
         """Record all topics to ``path`` from now on, an MCAP file that must not exist yet.
 
         Recorded before the start, a run can be replayed bit for bit. Recognition then uses the recorded, compressed
@@ -286,7 +286,7 @@ class Graph:
         Raises:
             RecordingError: The file cannot be created, or another recording is being made.
         """
-        self.recording.start(path, self.config, model_files(self.config), by, self.recognition.look_at_compressed)
+        self.recording.start(Path(path), self.config, model_files(self.config), by, self.recognition.look_at_compressed)
 
     def end_recording(self, by: str = _NAME) -> None:
         """End the recording, if there is one; ``by`` is who ends it, for the audit. May be called from any thread."""

@@ -73,6 +73,11 @@ def test_help_of_a_verb_has_no_other_examples(capsys: pytest.CaptureFixture[str]
     assert "handsteer report drive.mcap" not in prints(capsys, "run", "--help")
 
 
+@pytest.mark.parametrize("words", [["run"], ["signs", "list"], ["doctor"]], ids=" ".join)
+def test_help_after_a_parameter_is_help(capsys: pytest.CaptureFixture[str], words: list[str]) -> None:
+    assert f"Usage: handsteer {' '.join(words)} " in prints(capsys, *words, "--control.max-linear", "0.5", "--help")
+
+
 def test_parameters_are_listed_and_found(capsys: pytest.CaptureFixture[str]) -> None:
     control = prints(capsys, "parameters", "control")
     assert (

@@ -152,6 +152,11 @@ def run(words: list[str]) -> int:
     return exit_code(lambda: _run(words))
 
 
+def _is_of_cyclopts(verb: Callable[..., object]) -> bool:
+    """Return whether it prints the help or the version."""
+    return verb.__module__.startswith("cyclopts")
+
+
 def _run(words: list[str]) -> int:
     own, parameters = take_parameters(_ros_words_last(words))
     try:
@@ -160,9 +165,9 @@ def _run(words: list[str]) -> int:
         return fail(_problem(error))
     if "parameters" in unparsed:
         given.arguments["parameters"] = parameters
-    elif parameters:
+    elif parameters and not _is_of_cyclopts(verb):
         return fail(f"{words[0]} takes no parameters of the configuration; see handsteer {words[0]} --help")
-    if not verb.__module__.startswith("cyclopts"):  # help and version, which load little
+    if not _is_of_cyclopts(verb):  # help and version load little
         # First: it loads the parameters of plug-ins, whose modules may import any other, which must not be half loaded.
         importlib.import_module("handsteer.config")
     for module in _LOADS.get(verb, ()):

@@ -51,7 +51,7 @@ _FILE: Final = NpzFormat(
     FORMAT,
     missing=ModelMissing,
     corrupt=ModelCorrupt,
-    remedy="give one that `handsteer signs train` has written, or train it again",
+    remedy="give one that `handsteer signs train` has written, train it again, or remove the parameter signs.model",
 )
 
 

@@ -13,6 +13,7 @@ from playwright.sync_api import Locator, ViewportSize
 from handsteer.cameras import freshness
 from handsteer.cameras.files import video_frames
 from handsteer.config import load
+from handsteer.plugins.page.lessons import with_signs
 from handsteer.plugins.teach.dataset import load_dataset
 from handsteer.plugins.teach.exchange import LARGEST_SHARED_BYTES
 from handsteer.plugins.teach.onnx_file import as_onnx
@@ -240,6 +241,17 @@ def always(visit: Visit, file: Path) -> None:
     press(visit, "Use at every start")
     visit.page.locator(".always", has_text="Use them at every start by").wait_for()
     assert kept() == (file.with_name("mine.npz"), {"Two": "turn_left"})
+    box, config = visit.page.locator(".always"), visit.graph.config
+    visit.graph.reconfigure(with_signs(config, config.signs.model, {"Two": "stop"}))
+    box.filter(has_text="has other actions for these signs").wait_for()
+    press(visit, "Use at every start")
+    box.filter(has_text="Use them at every start by").wait_for()
+    assert kept() == (file.with_name("mine.npz"), {"Two": "stop"})
+    visit.graph.reconfigure(with_signs(config, None, {}, ["Two"]))
+    box.filter(has_text="names taught signs that are not in use").wait_for()
+    assert not box.get_by_role("button", name="Use at every start", exact=True).is_visible()
+    visit.graph.reconfigure(config)
+    box.filter(has_text="has other actions for these signs").wait_for()
     press(visit, "No longer use at every start")
     visit.page.locator(".always", has_text="until handsteer ends").wait_for()
     assert kept() == (None, {})
@@ -342,4 +354,25 @@ def test_a_lesson_is_for_all_and_fits_a_phone(visit: Visit) -> None:
     )
     assert small == []
     card.locator(".hold").scroll_into_view_if_needed()
+    assert visit.troubles == []
+
+
+def test_a_second_lesson_on_one_page_shows_each_sign_with_its_own_takes_and_action(
+    visit: Visit, plan: dict[str, Any]
+) -> None:
+    own, page = visit.page.locator(".class.own"), visit.page
+    card = begin(visit, "Peace")
+    hold(visit, card)
+    card.get_by_role("button", name="forward", exact=True).click()
+    press(visit, "Keep")
+    page.locator(".tools .message", has_text="The takes are kept").wait_for()
+    press(visit, "End the lesson")
+    begin(visit, "Call")
+    headings = [one.get_by_role("heading").inner_text() for one in own.all()]
+    assert headings == ["Peace", "Call", "Background"]
+    assert own.first.locator(".take").count() == 1
+    assert page.locator(".actions [aria-pressed=true]").count() == 0, "none was chosen in this lesson"
+    hold(visit, own.nth(1))
+    press(visit, "Keep")
+    visit.wait_until(lambda: {take.label for take in load_dataset(plan["dataset"]).takes} == {"Peace", "Call"})
     assert visit.troubles == []

@@ -229,7 +229,7 @@ def test_a_sign_that_is_renamed_or_deleted_keeps_its_action_while_the_model_know
     node.do(lambda lesson: lesson.rename(key_of(node, "Hi"), "Halt"))
     delete(node, "Ho")
     taught.lessons.save("ann", {"Halt": "stop"})
-    assert node.state.message == KEPT_TAKES
+    assert node.state.message == "The takes are kept. Until you train, Hi counts as before."
     assert taught.config.control.actions == {"Hi": "stop", "Ho": "turbo", "Halt": "stop"}
     assert load_custom_model(taught.folder / "mine.npz").labels == ("Hi", "Ho")
 

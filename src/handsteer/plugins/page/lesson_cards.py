@@ -44,8 +44,14 @@ class ClassCards:
         """Return the action of each sign for which one is selected."""
         return {card.label: card.action for card in self._cards.values() if card.action}
 
+    def clear(self) -> None:
+        """Remove the cards of a lesson: the classes of another one may have the same keys."""
+        for card in self._cards.values():
+            card.element.delete()
+        self._cards.clear()
+
     def update(self, state: LessonState) -> None:
-        """Show ``state``."""
+        """Show ``state``, of the same lesson as before or after :meth:`clear`."""
         for key in [key for key in self._cards if state.of(key) is None]:
             self._cards.pop(key).element.delete()
         for place, one in enumerate(state.classes):

@@ -46,6 +46,7 @@ class LessonPage(Page):
     def __init__(self, context: PageContext) -> None:
         super().__init__(context, "/teach", "drive.css", "teach.css", "teach.js")
         self._lesson: ViewerLesson | None = None
+        self._shown: object = None
         self._calibration: CalibrationPanel | None = None
         if context.lessons is None:
             with card("Teach", "lesson panel"):
@@ -88,6 +89,9 @@ class LessonPage(Page):
             self._start.update()
             return
         taught.attend()
+        if taught is not self._shown:
+            self._cards.clear()
+            self._shown = taught
         for panel in (self._panel, self._cards, self._report):
             panel.update(taught.state)
 

@@ -181,28 +181,33 @@ class AlwaysPanel:
 
     def update(self) -> None:
         """Show whether the next start uses the signs, if any are in use."""
-        running = self._settings.running.signs.model
-        shown = running, self._settings.revision
+        running = self._settings.running
+        shown = running.signs.model, running.control.actions, self._settings.revision
         if shown != self._shown:
             self._shown = shown
-            self._show(running)
+            self._show(running.signs.model, running.control.actions)
 
-    def _show(self, running: Path | None) -> None:
-        try:
-            kept = self._settings.in_file(_MODEL)
-        except HandsteerError as error:
-            kept = None
-            self._lesson.message = f"{error}."
-        is_kept = kept is not None and running is not None and _full(kept) == _full(running)
+    def _show(self, running: Path | None, actions: Mapping[str, Action]) -> None:
         file = self._settings.file
-        self._words.set_text(
-            f"These signs are in {file.path}. Use them at every start by: {file.start_command}"
-            if is_kept
-            else "These signs are in use until handsteer ends."
-        )
-        switch(self._box, "hidden", on=running is None)
-        switch(self._use, "hidden", on=is_kept)
-        switch(self._drop, "hidden", on=not is_kept)
+        try:
+            kept, kept_actions = self._settings.in_file(_MODEL), self._settings.in_file(_ACTIONS)
+        except HandsteerError as error:
+            kept, kept_actions = None, {}
+            self._lesson.message = f"{error}."
+        names = kept is not None and (running is None or _full(kept) == _full(running))
+        is_kept = running is not None and names and kept_actions == actions
+        if is_kept:
+            words = f"These signs are in {file.path}. Use them at every start by: {file.start_command}"
+        elif running is None:
+            words = f"{file.path} names taught signs that are not in use: {kept}"
+        elif names:
+            words = f"{file.path} has other actions for these signs, or other names."
+        else:
+            words = "These signs are in use until handsteer ends."
+        self._words.set_text(words)
+        switch(self._box, "hidden", on=running is None and not names)
+        switch(self._use, "hidden", on=running is None or is_kept)
+        switch(self._drop, "hidden", on=not names)
 
     async def _change(self, change: Callable[[], object]) -> None:
         if self._lesson.may_change():

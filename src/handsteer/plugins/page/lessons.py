@@ -156,7 +156,9 @@ class Lessons:
             path = self._plan.dataset.expanduser()
             if _version(path) != current.read:
                 raise DatasetError(f"{path} was changed by another program: end the lesson, and begin another")
-            message = KEPT_TAKES
+            gone = [label for label in (state.model.labels if state.model is not None else ()) if label not in labels]
+            takes = f"The takes are kept. Until you train, {gone[0]} counts as before." if gone else KEPT_TAKES
+            message = takes
             had = {one.label for one in state.kept}
             if state.model is not None and not labels and had.issuperset(state.model.labels):
                 self._forget_model(had)
@@ -170,7 +172,7 @@ class Lessons:
                     save_custom_model(state.model, self.model_path.expanduser())
                 removed = had - {*labels, *state.model.labels}
                 self._graph.reconfigure(with_signs(self._graph.config, self.model_path, effects, removed))
-                message = KEPT_TAKES if state.lost else KEPT
+                message = takes if state.lost else KEPT
             save_dataset(dataset, path)
             current.read = _version(path)
             current.node.do(lambda lesson: lesson.mark_kept(message))

@@ -716,6 +716,8 @@ const WORDS = {
   "Use at every start": "Bei jedem Start nutzen",
   "No longer use at every start": "Nicht mehr bei jedem Start nutzen",
   "These signs are in {}. Use them at every start by: {}": "Diese Zeichen sind in {}. Nutze sie bei jedem Start durch: {}",
+  "{} has other actions for these signs, or other names.": "{} hat andere Aktionen für diese Zeichen, oder andere Namen.",
+  "{} names taught signs that are not in use: {}": "{} nennt gelehrte Zeichen, die nicht genutzt werden: {}",
   "These signs are in use until handsteer ends.": "Diese Zeichen gelten, bis handsteer endet.",
   "Signs are taught where the camera, the recognition and the page run together: handsteer run. Elsewhere use handsteer signs collect and handsteer signs train, then set signs.model of the recognition.": "Zeichen werden da gelehrt, wo Kamera, Erkennung und Seite zusammen laufen: handsteer run. Sonst nimm handsteer signs collect und handsteer signs train, dann setze signs.model der Erkennung.",
 
@@ -798,6 +800,7 @@ const WORDS = {
   "The takes of the file are here: press Train, then try them.": "Die Aufnahmen der Datei sind da: drücke Trainieren, dann probiere sie.",
   "The signs of the file are here: try them, then keep them.": "Die Zeichen der Datei sind da: probiere sie, dann behalte sie.",
   "Kept, and in use. End the lesson, then press Reset to drive.": "Behalten und in Gebrauch. Beende die Lektion, dann drücke Zurücksetzen, um zu fahren.",
+  "The takes are kept. Until you train, {} counts as before.": "Die Aufnahmen sind behalten. Bis du trainierst, gilt {} wie bisher.",
   "The takes are kept. Train to use them.": "Die Aufnahmen sind behalten. Trainiere, um sie zu nutzen.",
   "Undo: delete the background": "Zurückholen: Hintergrund",
   "Undo: delete a take of the background": "Zurückholen: eine Aufnahme vom Hintergrund",
