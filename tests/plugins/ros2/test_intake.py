@@ -1,3 +1,4 @@
+import threading
 import time
 from typing import Any
 
@@ -92,6 +93,34 @@ def test_of_two_readers_the_newest_message_is_passed_on_last() -> None:
     for raw, sent_s in ((b"stop", 2.0), (b"reset", 1.0), (b"stop", 2.0), (b"stop", 2.0)):
         once.take(raw, b"", sent_s)
     assert passed == [b"stop", b"reset", b"stop"]
+
+
+def test_several_readers_pass_on_from_threads_of_their_own_one_after_the_other() -> None:
+    """Over Zenoh, each reader has a thread; what decodes and compares their messages is not made for several."""
+    inside, together, failed = threading.Lock(), list[str](), list[BaseException]()
+
+    def take(_raw: bytes, _sender: bytes, _sent_s: float | None) -> None:
+        if not inside.acquire(blocking=False):
+            together.append(threading.current_thread().name)
+            return
+        time.sleep(0.0002)
+        inside.release()
+
+    once = Once(take)
+
+    def read(first_s: float) -> None:
+        try:
+            for number in range(200):
+                once.take(b"stop", b"", first_s + number)
+        except BaseException as error:
+            failed.append(error)
+
+    readers = [threading.Thread(target=read, args=(1000.0 * number,)) for number in range(3)]
+    for reader in readers:
+        reader.start()
+    for reader in readers:
+        reader.join()
+    assert (together, failed) == ([], [])
 
 
 def test_a_message_that_cannot_be_read_is_left_out(caplog: pytest.LogCaptureFixture) -> None:

@@ -171,7 +171,7 @@ class Ros2Transport(BaseTransport):
         super().__init__(set())
         self._node_name = node
         self._clock = clock
-        self._unkept: list[_KeptStops] = []
+        self._unkept: set[_KeptStops] = set()
         self._looked_s = -math.inf
 
     def check(self) -> None:
@@ -186,7 +186,7 @@ class Ros2Transport(BaseTransport):
         for kept in tuple(self._unkept):
             if self._has_keepers(kept.topic):
                 kept.open()
-                self._unkept.remove(kept)
+                self._unkept.discard(kept)
 
     def subscribed_types(self, topic: Topic[Any]) -> set[str]:
         """Return the types of other processes' subscribers of ``topic``; none while this process uses it twice."""
@@ -229,9 +229,10 @@ class Ros2Transport(BaseTransport):
             reliabilities = (True, False) if self.connects_by_qos else (True,)
             ends = [self._open_reader(name, topic, replace(profile, reliable=each), once) for each in reliabilities]
             kept = _KeptStops(topic, once, partial(self._open_reader, name, topic, replace(profile, latched=True)))
-            self._unkept.append(kept)
+            self._unkept.add(kept)
 
             def close() -> None:
+                self._unkept.discard(kept)
                 for end in (*ends, kept.close):
                     end()
 
@@ -336,7 +337,7 @@ Take = Callable[[bytes, bytes, float | None], None]
 
 
 class Once:
-    """Passes on what two readers of one topic receive, each message once, and the newest of a sender last.
+    """Passes on what several readers of one topic receive, each message once, and the newest of a sender last.
 
     One reader may overtake the other, which has to wait for what was lost. So after an older message, a newer one that
     was passed on already is passed on again.
@@ -348,12 +349,13 @@ class Once:
     def __init__(self, take: Take) -> None:
         self._take = take
         self._taken: deque[tuple[bytes, float]] = deque(maxlen=_REMEMBERED)
+        self._lock = threading.RLock()
 
     def take(self, raw: bytes, sender: bytes, sent_s: float | None) -> None:
-        """Process one message; without a time of sending it may come twice."""
-        if sent_s is not None and self._is_taken((raw, sent_s)):
-            return
-        self._take(raw, sender, sent_s)
+        """Process one message, on any thread; without a time of sending it may come twice."""
+        with self._lock:
+            if sent_s is None or not self._is_taken((raw, sent_s)):
+                self._take(raw, sender, sent_s)
 
     def _is_taken(self, message: tuple[bytes, float]) -> bool:
         """Record a message; return whether it was passed on, and no older one after it."""

@@ -152,9 +152,9 @@ class RclpyTransport(Ros2Transport):
         else:
             live = open_(on_message, qos)
             end = partial(self._node.destroy_subscription, live)
-        # Of two, the second one takes what the first one does not; one of what is kept takes it from few.
-        end_of = End(name, self._unresolved(topic), topic, live.qos_profile, publishes=False)
-        forget = self._matching.add(end_of) if profile.latched == topic.latched else lambda: None
+        # Of two, the second one takes what the first one does not; a reader of what is kept takes it from few.
+        mine = End(name, self._unresolved(topic), topic, live.qos_profile, publishes=False)
+        forget = self._matching.add(mine) if profile.latched == topic.latched else lambda: None
 
         def close() -> None:
             forget()
