@@ -207,19 +207,6 @@ def test_of_many_types_that_differ_some_are_named(tmp_path: Path) -> None:
         assert control.text.count("the publisher of /talker") == 5
 
 
-def test_nodes_end_together_with_a_network_in_which_much_changes(tmp_path: Path) -> None:
-    """A full queue of changes would hold up Zenoh, which holds Python's lock meanwhile."""
-    with ZenohGraph(tmp_path) as graph:
-        nodes = [graph.node(verb, name=name) for verb, name in (("control", f"/{NODE}"), ("robot", "/robot"))]
-        for number in range(3000):
-            graph.peer.ask("introduce", name=f"talker{number}", topic="/stopped", type="Twist", kind="MP")
-        eventually(lambda: all("there are more of these" in node.text for node in nodes), what="all to be seen")
-        for process in (*nodes, graph.router):
-            process.ask_to_end()
-        for node in nodes:
-            assert node.code() == 0, node.text
-
-
 def test_nodes_of_other_domains_are_not_seen(network: ZenohGraph) -> None:
     other = network.handsteer("control", "--transport", "zenoh", "--ros-args", "-r", "__ns:=/other", ROS_DOMAIN_ID="8")
     network.node("control", name="/same/hand_sign_control", ros=("-r", "__ns:=/same"))
