@@ -276,12 +276,15 @@ def test_kill_9_of_the_master_stops_a_robot_that_is_being_driven_faster(tmp_path
 def test_a_master_that_only_takes_long_is_waited_for(tmp_path: Any) -> None:
     with ros1_graph(tmp_path) as graph:
         driver = Ros1Driver(graph, *PATIENT)
+        # Before its first command, the control asks the master what the robot takes.
+        driver.show("NONE")
+        driver.expect((0.0, 0.0))
         pid = graph.master.getPid("/test")[2]
         os.kill(pid, signal.SIGSTOP)
         try:
             for shown in range(8, 81, 8):  # a node keeps ten that wait
                 driver.show("Forward", count=8, period_s=0.04)
-                driver.expect(*[(round(0.01 * n, 6), 0.0) for n in range(1, shown + 1)])
+                driver.expect(*[(round(0.01 * n, 6), 0.0) for n in range(shown + 1)])
         finally:
             os.kill(pid, signal.SIGCONT)
         assert driver.process.running
