@@ -155,6 +155,11 @@ def test_in_real_time_latency_is_measured_and_the_end_is_a_zero() -> None:
     assert commands[-1] == 0.0
 
 
+def test_a_wait_for_what_is_not_a_number_ends() -> None:
+    with Graph(Config(camera=CameraConfig(source="virtual"))) as graph:
+        graph.wait(math.nan)
+
+
 def test_changed_parameters_are_in_the_audit_with_who_changed_them() -> None:
     with Graph(Config(), SteppedClock()) as graph:
         told: list[Log] = []

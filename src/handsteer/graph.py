@@ -197,7 +197,7 @@ class Graph:
         """Wait until ``duration_s`` seconds have passed, or the camera's file or a real robot's graph ends the run.
 
         Args:
-            duration_s: Maximum time to wait; unlimited by default.
+            duration_s: Maximum time to wait; unlimited by default. One that is not a number waits for nothing.
             until: Called five times a second; true ends the wait.
 
         Raises:
@@ -205,7 +205,7 @@ class Graph:
         """
         end_s = self.clock.now() + (math.inf if duration_s is None else duration_s)
         while not self.camera.ended.wait(max(0.0, min(_LOOK_PERIOD_S, end_s - self.clock.now()))):
-            if self.clock.now() >= end_s or (self._link is not None and self._link.wait(0.0)) or until():
+            if not self.clock.now() < end_s or (self._link is not None and self._link.wait(0.0)) or until():
                 return
 
     def stop(self) -> None:

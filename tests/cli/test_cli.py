@@ -100,6 +100,9 @@ def prints(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -
         (["run", "--robot.preset", "turtlbot4"], r"robot\.preset: 'turtlbot4' .*: did you mean turtlebot4\?"),
         (["run", "--world", "obstacle"], r"obstacle.*did you mean obstacles\?"),
         (["recognize", "gone.jpg"], r"there is no gone\.jpg: give a photo, a folder of photos or a video file"),
+        (["recognize", str(__file__), "gone.jpg"], r"there is no gone\.jpg: give a photo"),
+        (["recognize", str(__file__), "--jsno"], r"Unknown option: --jsno\. Did you mean --json"),
+        (["parameters", "signs", "a.yaml", "b.yaml"], r'unexpected argument "a\.yaml" and 1 more; see handsteer param'),
         (["camera"], r"--transport requires an argument"),
         (["control", "--transport", "pigeon"], r"there is no transport 'pigeon': use dds or ros1"),
         (["control", "--transport", "ros1", "--config", "gone.yaml"], r"cannot read the configuration gone\.yaml"),
@@ -203,6 +206,15 @@ def test_recognize_prints_a_line_a_frame(capsys: pytest.CaptureFixture[str], sli
 def test_recognize_a_photo(capsys: pytest.CaptureFixture[str], data_dir: Path) -> None:
     photo = sorted((data_dir / "photos" / "stop").glob("emre*"))[0]
     assert "Stop" in prints(capsys, "recognize", str(photo))
+
+
+def test_recognize_several_photos_and_folders(
+    capsys: pytest.CaptureFixture[str], data_dir: Path, tmp_path: Path
+) -> None:
+    photos = [sorted((data_dir / "photos" / sign).glob("emre*"))[0] for sign in ("go", "stop")]
+    (tmp_path / photos[1].name).write_bytes(photos[1].read_bytes())
+    lines = prints(capsys, "recognize", str(photos[0]), str(tmp_path)).splitlines()
+    assert [re.split(r"\s{2,}", line)[3] for line in lines] == ["Go", "Stop"]
 
 
 def test_a_photo_that_cannot_be_a_frame_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -88,6 +89,16 @@ def test_parameters_are_listed_and_found(capsys: pytest.CaptureFixture[str]) -> 
     both = {row["name"] for row in json.loads(prints(capsys, "parameters", "max-linear", "--json"))}
     assert both >= {"control.max_linear", "robot.max_linear"}
     assert "the sections are camera, " in fails(capsys, "parameters", "colour")
+
+
+def test_the_signs_are_listed_as_a_start_here_uses_them(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``handsteer.yaml`` of the working directory counts, as in ``handsteer run``."""
+    monkeypatch.chdir(tmp_path)
+    Path("handsteer.yaml").write_text("control: {actions: {Go: stop}}", encoding="utf-8")
+    rows = json.loads(prints(capsys, "signs", "list", "--json"))
+    assert next(row["action"] for row in rows if row["sign"] == "Go") == "stop"
 
 
 def test_parameters_are_options_of_every_form(capsys: pytest.CaptureFixture[str]) -> None:

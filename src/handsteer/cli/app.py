@@ -13,7 +13,15 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from cyclopts import App, CoercionError, CycloptsError, Parameter, UnknownCommandError, UnknownOptionError
+from cyclopts import (
+    App,
+    CoercionError,
+    CycloptsError,
+    Parameter,
+    UnknownCommandError,
+    UnknownOptionError,
+    UnusedCliTokensError,
+)
 
 from handsteer import __version__
 from handsteer.cli import signals
@@ -209,6 +217,9 @@ def _problem(error: CycloptsError) -> str:
         near = did_you_mean(error.unused_tokens[0], verbs)
         return f'Unknown command "{error.unused_tokens[0]}"{near or ":"} the commands are {", ".join(verbs)}'
     text = str(error).rstrip(".")
+    if isinstance(error, UnusedCliTokensError) and error.unused_tokens:
+        further = len(error.unused_tokens) - 1
+        text = f'unexpected argument "{error.unused_tokens[0]}"' + (f" and {further} more" if further else "")
     wrong = _NOT_A_NUMBER.fullmatch(text)
     if wrong:
         text = f"{wrong[1]}: {wrong[2]} should be {'a' if wrong[3] == 'float' else 'a whole'} number"

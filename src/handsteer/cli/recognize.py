@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 @loads("handsteer.cameras.files", "handsteer.recognition.recognizer", "tqdm")
 def recognize(
-    source: Path, /, *, json: Flag = False, config_file: ConfigFile = None, parameters: Parameters = None
+    source: Path, /, *more: Path, json: Flag = False, config_file: ConfigFile = None, parameters: Parameters = None
 ) -> int:
-    """Print which sign each frame of a photo, a folder of photos or a video shows.
+    """Print which sign each frame of photos, folders of photos and videos shows.
 
     Photos are processed independently, the frames of a video like those of a camera. A summary follows on standard
     error.
 
     For example:
-      handsteer recognize photo.jpg         one photo
+      handsteer recognize photo.jpg         one photo; also *.jpg
       handsteer recognize photos/           all photos of a folder
       handsteer recognize drive.mp4 --json  a video, a line of JSON for each frame
 
@@ -34,29 +34,39 @@ def recognize(
     ----------
     source
         A photo, a folder of photos or a video file.
+    more
+        Further ones.
     json
         Print one JSON object per line, with the landmarks.
     config_file
         YAML file with parameters, each of which is an option too: `handsteer parameters`. Options override the file.
     """
-    from handsteer.cameras.files import PHOTO_SUFFIXES
     from handsteer.cli.installation import fetch_missing
     from handsteer.recognition.recognizer import Recognizer
 
     config = settings(config_file, parameters)
-    if not source.exists():
-        raise CameraNotFound(f"there is no {source}: give a photo, a folder of photos or a video file")
+    sources = (source, *more)
+    for each in sources:
+        if not each.exists():
+            raise CameraNotFound(f"there is no {each}: give a photo, a folder of photos or a video file")
     fetch_missing(config)
     recognizer = Recognizer(config)
-    is_photo = source.is_dir() or source.suffix.lower() in PHOTO_SUFFIXES
     signs: Counter[str] = Counter()
     began_s = time.monotonic()
-    for result in (_photos if is_photo else _video)(source, recognizer):
-        signs[result.sign] += 1
-        print(json_format.dumps(asdict(result)) if json else _text(result), flush=True)
+    for each in sources:
+        for result in (_photos if _is_photo(each) else _video)(each, recognizer):
+            signs[result.sign] += 1
+            print(json_format.dumps(asdict(result)) if json else _text(result), flush=True)
     if signs.total() > 1:
-        say(_summary(signs, "photos" if is_photo else "frames", time.monotonic() - began_s))
+        unit = "photos" if all(map(_is_photo, sources)) else "frames"
+        say(_summary(signs, unit, time.monotonic() - began_s))
     return 0
+
+
+def _is_photo(source: Path) -> bool:
+    from handsteer.cameras.files import PHOTO_SUFFIXES
+
+    return source.is_dir() or source.suffix.lower() in PHOTO_SUFFIXES
 
 
 def _summary(signs: Counter[str], unit: str, took_s: float) -> str:
@@ -93,6 +103,7 @@ def _photos(source: Path, recognizer: "Recognizer") -> Iterator[_Result]:
 def _video(path: Path, recognizer: "Recognizer") -> Iterator[_Result]:
     from handsteer.cameras.files import video_frames
 
+    recognizer.reset()
     last_s = 0.0
     for number, frame in enumerate(video_frames(path)):
         recognition = recognizer.step(frame.image, frame.captured_s - last_s)

@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from handsteer.cli.app import ConfigFile, Flag, Parameters, loads
-from handsteer.cli.running import check_writable, say, settings, table
+from handsteer.cli.running import check_writable, default_file, say, settings, table
 from handsteer.errors import ModelError, TrainingError
 
 _LOW_RECALL = 0.8
@@ -32,12 +32,13 @@ def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters
         Print one JSON list.
     config_file
         YAML file with parameters, each of which is an option too: `handsteer parameters`. Options override the file.
+        Without it, handsteer.yaml of the working directory, if there is one, as in `handsteer run`.
     """
     from handsteer.control.explain import effect_of
     from handsteer.recognition.recognizer import open_classifier
     from handsteer.types import NONE, action_of, find_sign
 
-    config = settings(config_file, parameters)
+    config = settings(config_file or default_file(), parameters)
     actions = config.control.actions
     known = (*open_classifier(config.signs).signs, NONE)
     named = [sign for sign in actions if find_sign(sign, known) is None]
