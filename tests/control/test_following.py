@@ -21,6 +21,15 @@ def test_a_robot_whose_odometry_stops_is_not_there() -> None:
     assert following.step(0.02, Velocity(0.5, 0.0)) is None
 
 
+@pytest.mark.parametrize("checks_motion", [True, False])
+def test_a_robot_whose_odometry_has_never_been_a_number_is_not_there(checks_motion: bool) -> None:
+    following = Following(checks_motion=checks_motion)
+    following.note(Velocity(math.nan, 0.0))
+    assert following.step(0.35, Velocity(0.5, 0.0)) is None
+    following.note(Velocity(math.nan, 0.0))
+    assert following.step(0.06, Velocity(0.5, 0.0)) == "the robot's odometry has stopped"
+
+
 def test_where_motion_is_not_checked_silence_still_is() -> None:
     following = Following(checks_motion=False)
     for _ in range(200):

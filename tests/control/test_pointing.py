@@ -144,6 +144,55 @@ def test_a_hand_that_points_at_the_start_moves_nothing() -> None:
     assert shown(control, FORWARD, AHEAD).linear_mps > 0
 
 
+def alone(control: Control, stick: Stick, seconds: float) -> Velocity:
+    """Show ``stick`` for a while without signs, as where their connection stalls, and return the velocity."""
+    for _ in range(round(seconds / DT_S)):
+        control.step(DT_S, stick=stick)
+    return control.mux.velocity
+
+
+@pytest.mark.parametrize("arming", [False, True])
+@pytest.mark.parametrize("engage", [False, True])
+@pytest.mark.parametrize("silent_s", [0.4, 5.0])
+def test_where_signs_fall_silent_it_stops_and_has_to_be_released(arming: bool, engage: bool, silent_s: float) -> None:
+    control = Control(CONFIG.model_copy(update={"engage_by": "hold"}), arming=arming, engage=engage)
+    shown(control, STOP, RELEASED, 2.0)
+    assert shown(control, FORWARD, AHEAD).linear_mps > 0
+    assert alone(control, AHEAD, silent_s) == ZERO
+    assert control.reason.code == "no_input"
+    assert control.safety.engagement.engaged is not engage
+    assert shown(control, FORWARD, AHEAD, 2.0) == ZERO
+    shown(control, STOP, RELEASED, 2.0)
+    assert shown(control, FORWARD, AHEAD).linear_mps > 0
+
+
+@pytest.mark.parametrize("arming", [False, True])
+def test_before_the_first_sign_nothing_counts_as_a_release(arming: bool) -> None:
+    control = Control(CONFIG, arming=arming)
+    for stick in (AHEAD, RELEASED, AHEAD):
+        assert alone(control, stick, 2.0) == ZERO
+    assert shown(control, FORWARD, AHEAD, 2.0) == ZERO
+
+
+def test_a_stop_that_was_reset_without_signs_needs_a_release(control: Control) -> None:
+    shown(control, FORWARD, AHEAD)
+    control.stop()
+    alone(control, AHEAD, 1.0)
+    control.reset()
+    alone(control, AHEAD, 1.0)
+    assert shown(control, FORWARD, AHEAD, 2.0) == ZERO
+
+
+def test_a_silence_of_both_is_no_release_whichever_comes_first(control: Control) -> None:
+    for first in ({"stick": AHEAD}, {"sign": FORWARD}):
+        shown(control, STOP, RELEASED)
+        assert shown(control, FORWARD, AHEAD).linear_mps > 0
+        for _ in range(30):
+            control.step(DT_S)
+        control.step(DT_S, **first)  # type: ignore[arg-type]
+        assert shown(control, FORWARD, AHEAD, 2.0) == ZERO
+
+
 def test_signs_alone_do_not_drive(control: Control) -> None:
     for _ in range(30):
         control.step(DT_S, sign=FORWARD)
@@ -195,6 +244,8 @@ def test_after_20_s_without_any_change_it_has_to_be_shown_anew() -> None:
     assert shown(control, FORWARD, AHEAD, 1.9).linear_mps > 0
     assert shown(control, FORWARD, AHEAD, 0.3) == ZERO
     assert shown(control, FORWARD, AHEAD, 1.0) == ZERO
+    alone(control, AHEAD, 0.5)
+    assert shown(control, FORWARD, AHEAD, 1.0) == ZERO, "a pause of the signs is no release"
     shown(control, STOP, RELEASED)
     assert shown(control, FORWARD, AHEAD).linear_mps > 0
 

@@ -45,7 +45,7 @@ class Control:
         self.mux = TwistMux(config)
         self._ramp = Ramp(config)
         self._since_command_s = 0.0
-        self._since_sign_s = 0.0
+        self._since_sign_s = math.inf
         self._stop_is_shown = True
 
     def step(
@@ -96,6 +96,8 @@ class Control:
         velocity = self.mux.step(dt_s, sign=sign, steering=steering, stick=stick)
         if self.mux.source in ("signs", "joystick") and not self.safety.engagement.engaged:
             velocity = self.mux.halt()  # it may be disengaged between two frames
+        if self.mux.source == "joystick" and self._lacks_signs:
+            velocity = self.mux.halt()
         if self.renew_left_s <= _SLACK_S:
             velocity = self._end_unchanged(self._driven_by)
         return self._ramped(velocity)
@@ -192,17 +194,24 @@ class Control:
     def _way_to_drive(self, config: ControlConfig) -> tuple[str, ...]:
         return config.mode, config.rule, action_of(self.mux.shown, config.actions)
 
+    @property
+    def _lacks_signs(self) -> bool:
+        """Whether the hand points without signs, which say when it stops."""
+        return self._config.points and self._since_sign_s >= self._config.sign_timeout
+
     def _agreeing(self, sign: str | None, stick: Stick | None) -> Stick | None:
         """Return the stick that counts: released, at once, by a sign that stops, whatever it says until another one.
 
-        So it is where no signs come.
+        Where no signs come, none does: that is a fault, not a release.
         """
-        if sign is None and self._since_sign_s >= self._config.sign_timeout:
-            self._stop_is_shown = True
         if sign is not None:
             self._since_sign_s = 0.0
             self._stop_is_shown = action_of(sign, self._config.actions) == "stop"
             self.mux.note_shown(sign)
+        elif self._lacks_signs:
+            if self._since_sign_s < math.inf:
+                self.safety.fault("no sign came")
+            return None
         is_asked = sign is not None or stick is not None
         return RELEASED if is_asked and self._stop_is_shown else stick
 

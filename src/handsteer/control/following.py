@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from handsteer.timeouts import NOT_FOLLOWING_S, ODOMETRY_S, OPPOSES_S, STOOD_BY_ITSELF_S
-from handsteer.types import Velocity
+from handsteer.types import ZERO, Velocity
 
 _SLACK_S: Final = 1e-9
 _STILL_AS_FAST: Final = 0.9
@@ -31,10 +31,12 @@ class Following:
         self._opposition = (_Opposition(0.15, 0.1), _Opposition(0.4, 0.25))
 
     def note(self, measured: Velocity) -> None:
-        """Record a velocity from odometry; values that are not finite are ignored."""
+        """Record a velocity from odometry; one that is not finite only shows that there should be some."""
         if measured.is_finite:
             self._measured = measured
             self._age_s = 0.0
+        elif self._measured is None:
+            self._measured = ZERO
 
     def step(self, dt_s: float, commanded: Velocity) -> str | None:
         """Advance time by ``dt_s`` seconds of ``commanded``; return what is wrong with the robot, or None."""
