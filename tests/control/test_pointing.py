@@ -189,7 +189,7 @@ def test_a_silence_of_both_is_no_release_whichever_comes_first(control: Control)
         assert shown(control, FORWARD, AHEAD).linear_mps > 0
         for _ in range(30):
             control.step(DT_S)
-        control.step(DT_S, **first)  # type: ignore[arg-type]
+        control.step(DT_S, **first)
         assert shown(control, FORWARD, AHEAD, 2.0) == ZERO
 
 

@@ -94,9 +94,7 @@ class Control:
         ):
             steering = ZERO
         velocity = self.mux.step(dt_s, sign=sign, steering=steering, stick=stick)
-        if self.mux.source in ("signs", "joystick") and not self.safety.engagement.engaged:
-            velocity = self.mux.halt()  # it may be disengaged between two frames
-        if self.mux.source == "joystick" and self._lacks_signs:
+        if self._has_lost_the_hand:
             velocity = self.mux.halt()
         if self.renew_left_s <= _SLACK_S:
             velocity = self._end_unchanged(self._driven_by)
@@ -193,6 +191,12 @@ class Control:
 
     def _way_to_drive(self, config: ControlConfig) -> tuple[str, ...]:
         return config.mode, config.rule, action_of(self.mux.shown, config.actions)
+
+    @property
+    def _has_lost_the_hand(self) -> bool:
+        """Whether the hand still drives that was disengaged between two frames, or points where no signs come."""
+        is_by_hand, engaged = self.mux.source in ("signs", "joystick"), self.safety.engagement.engaged
+        return is_by_hand and (not engaged or (self.mux.source == "joystick" and self._lacks_signs))
 
     @property
     def _lacks_signs(self) -> bool:
