@@ -35,6 +35,30 @@ def search(page: Page, words: str, count: int) -> None:
             return
 
 
+@pytest.mark.parametrize("name", ["Save", "Load what the file says"])
+def test_what_was_just_typed_is_saved_or_dropped_by_a_quick_click(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page sends a click of no duration before it sends that the field was left."""
+    monkeypatch.chdir(tmp_path)
+    if name != "Save":
+        (tmp_path / "handsteer.yaml").write_text("camera: {fps: 5}", encoding="utf-8")
+    with visiting("NONE:600", "/settings", camera={"fps": 5}) as visit:
+        page, graph = visit.page, visit.graph
+        field = of(page, "control.max_linear")
+        expect(field).to_have_value("1")
+        field.click()
+        page.keyboard.press("Control+a")
+        page.keyboard.type("0.321")
+        page.get_by_role("button", name=name, exact=True).click()
+        done = "saved to handsteer.yaml" if name == "Save" else "loaded handsteer.yaml"
+        expect(page.locator(".said")).to_have_text(done)
+        expect(field).to_have_value("0.321" if name == "Save" else "1")
+        expect(page.locator(".state")).to_have_text("as in the file")
+        assert load(tmp_path / "handsteer.yaml").control.max_linear == (0.321 if name == "Save" else 1.0)
+        assert graph.config.control.max_linear == (0.321 if name == "Save" else 1.0)
+
+
 def test_the_driver_sets_what_the_robot_does_and_saves_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with visiting("NONE:600", "/settings", camera={"fps": 5}) as visit:

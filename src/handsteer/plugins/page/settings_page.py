@@ -117,17 +117,26 @@ class SettingsPanel:
         return error
 
     def _save_file(self) -> None:
+        # A browser may send the click before it sends that the field, with what was just entered, is left.
+        if any(row.take() for row in self._rows()):
+            return
         done: list[str] = []
         if not self._change(lambda: done.append(self._settings.save())):
             self._message.set_text(done[0])
 
     def _load_file(self) -> None:
+        self._drop_edits()
         self._change(self._settings.load, f"loaded {self._settings.file.path.name}")
 
     def _reset_all(self) -> None:
+        self._drop_edits()
         self._change(
             lambda: self._settings.reset(*(row.field for row in self._rows())), "all is as by default; not saved"
         )
+
+    def _drop_edits(self) -> None:
+        for row in self._rows():
+            row.drop()
 
     def _group(self, name: str, title: str, meaning: str, fields: tuple[Field, ...], index: ui.element) -> None:
         with index:

@@ -77,6 +77,15 @@ class Row:
         else:
             self._input.props["readonly"] = not editable
 
+    def take(self) -> str:
+        """Apply what was entered and is not applied yet; return an error message, or an empty text."""
+        return self._take() if self._is_edited else ""
+
+    def drop(self) -> None:
+        """Forget what was entered and is not applied yet."""
+        if self._is_edited:
+            self._give_up()
+
     def _make_input(self) -> ui.input | ui.select | ui.switch:
         field = self.field
         # Given here, because each value that is set later is a message, for which the browser draws all rows again.
@@ -117,17 +126,19 @@ class Row:
             return self._without_name(str(error))
         return None
 
-    def _take(self) -> None:
-        if self._is_updating:
-            return
+    def _take(self) -> str:
+        is_left = isinstance(self._input, ui.input) and not self._is_edited
+        if self._is_updating or is_left:
+            return ""
         if self._is_current:
             self._give_up()
-            return
+            return ""
         entered = self._text
         error = self._change(lambda: self._settings.set(self.field, entered))
         self._give_up(error)
         # Invalid text stays to be corrected; an invalid choice returns to the value that is set.
         self._is_edited = bool(error) and isinstance(self._input, ui.input)
+        return error
 
     def _to_default(self) -> None:
         self._give_up(self._change(lambda: self._settings.reset(self.field)))
