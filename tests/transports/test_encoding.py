@@ -4,15 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handsteer.messages import Header, Image, String, Time, twist
-from handsteer.transports.encoding import (
-    dds_type_name,
-    decode,
-    encode,
-    request_type,
-    ros_type_name,
-    type_hash,
-    types,
-)
+from handsteer.transports.encoding import decode, encode, request_type, type_hash, types
 
 FINITE = st.floats(allow_nan=False)
 
@@ -60,11 +52,6 @@ def test_hashes_are_those_of_ros2(name: str, digest: str) -> None:
 def test_identifiers_have_the_length_of_the_distribution(distribution: str, length: int) -> None:
     fields = dict(types(distribution).fielddefs["rmw_dds_common/msg/Gid"][1])
     assert fields["data"][1][1] == length
-
-
-def test_names_in_dds() -> None:
-    assert dds_type_name("geometry_msgs/msg/Twist") == "geometry_msgs::msg::dds_::Twist_"
-    assert ros_type_name("geometry_msgs::msg::dds_::Twist_") == "geometry_msgs/msg/Twist"
 
 
 LIST = "rcl_interfaces/srv/ListParameters"

@@ -81,7 +81,7 @@ from handsteer.errors import TransportError
 from handsteer.plugins.dds.addresses import AddressWatch
 from handsteer.plugins.dds.network import network
 from handsteer.plugins.dds.participant import Participant
-from handsteer.transports.encoding import NodeName
+from handsteer.plugins.ros2.names import NodeName
 participant = Participant(network(os.environ), NodeName("tests"))
 watch = AddressWatch()
 for change in sys.argv[1:]:

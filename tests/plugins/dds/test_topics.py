@@ -18,7 +18,7 @@ from handsteer.messages import (
     type_name,
 )
 from handsteer.plugins.dds.topics import dds_type, describe, misfits, reader_qos, writer_qos
-from handsteer.transports.encoding import dds_type_name
+from handsteer.plugins.ros2.names import dds_type_name
 
 RELIABLE = Policy.Reliability.Reliable(0)
 

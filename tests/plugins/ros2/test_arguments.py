@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from handsteer.errors import TransportError
 from handsteer.plugins.ros2.arguments import ParameterRule, parse_arguments
-from handsteer.transports.encoding import Remap
+from handsteer.plugins.ros2.names import Remap
 
 TOKENS = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True)
 VALUES = st.booleans() | st.integers(-1000, 1000) | st.floats(-1e3, 1e3) | st.text("abc :#'\"-", max_size=8)

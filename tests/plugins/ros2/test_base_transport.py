@@ -6,8 +6,9 @@ import pytest
 from handsteer.clock import RealClock
 from handsteer.messages import CMD_VEL, HAND_SIGN, STOP, Bool, Topic
 from handsteer.plugins.ros2.base_transport import Other, Profile, Ros2Transport, Take, WireTransport, Writer
+from handsteer.plugins.ros2.names import NodeName
 from handsteer.transports.base import Received
-from handsteer.transports.encoding import NodeName, encode
+from handsteer.transports.encoding import encode
 from tests.processes import eventually
 
 

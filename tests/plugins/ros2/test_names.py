@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from handsteer.errors import TransportError
 from handsteer.messages import CAMERA_INFO, CLOCK, CMD_VEL, IMAGE_COMPRESSED, IMAGE_RAW, TF
-from handsteer.transports.encoding import NodeName, Remap, identify
+from handsteer.plugins.ros2.names import NodeName, Remap, dds_type_name, identify, ros_type_name
 
 TOKENS = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True)
 FULL = st.lists(TOKENS, min_size=1, max_size=4).map(lambda parts: "".join(f"/{part}" for part in parts))
@@ -136,3 +136,8 @@ def test_a_remapped_topic_has_its_target_in_every_namespace(name: str, new: str,
 def test_wrong_names_are_refused_at_the_start(rule: Remap, message: str) -> None:
     with pytest.raises(TransportError, match=f"^{re.escape(message)}"):
         identify("cam", [rule])
+
+
+def test_names_in_dds() -> None:
+    assert dds_type_name("geometry_msgs/msg/Twist") == "geometry_msgs::msg::dds_::Twist_"
+    assert ros_type_name("geometry_msgs::msg::dds_::Twist_") == "geometry_msgs/msg/Twist"

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 pytest.importorskip("zenoh")
 
 from handsteer.plugins.ros2.base_transport import Profile
+from handsteer.plugins.ros2.names import NodeName
 from handsteer.plugins.zenoh.keys import (
     Endpoint,
     Entity,
@@ -18,7 +19,6 @@ from handsteer.plugins.zenoh.keys import (
     read_token,
     topic_key,
 )
-from handsteer.transports.encoding import NodeName
 
 HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 CHATTER = Endpoint("publisher", "/chatter", "std_msgs/msg/String", HASH)

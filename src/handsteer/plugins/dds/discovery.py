@@ -29,8 +29,9 @@ from cyclonedds.topic import Topic
 from handsteer.messages import Image, type_name
 from handsteer.plugins.dds.topics import dds_type, describe, discovery_qos, host, misfits
 from handsteer.plugins.ros2.base_transport import unconnected
+from handsteer.plugins.ros2.names import NodeName, dds_type_name, ros_type_name
 from handsteer.transports.base import UNNAMED
-from handsteer.transports.encoding import NodeName, dds_type_name, ros_type_name, types
+from handsteer.transports.encoding import types
 
 _INFO = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 _DISCOVERY = "ros_discovery_info"

@@ -16,8 +16,8 @@ from handsteer.plugins.dds.discovery import Endpoint
 from handsteer.plugins.dds.network import Network, network
 from handsteer.plugins.dds.participant import Participant
 from handsteer.plugins.dds.topics import describe, misfits
+from handsteer.plugins.ros2.names import NodeName, ros_type_name
 from handsteer.transports.base import UNNAMED, many_publishers
-from handsteer.transports.encoding import NodeName, ros_type_name
 
 # ROS 2's own tools hide nodes whose names begin with it.
 _HIDDEN = "_"

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from handsteer.errors import TransportError
-from handsteer.transports.encoding import domain_id
+from handsteer.plugins.ros2.names import domain_id
 
 try:
     import fcntl

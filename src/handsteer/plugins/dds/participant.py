@@ -36,8 +36,9 @@ from handsteer.plugins.dds.topics import (
     writer_qos,
 )
 from handsteer.plugins.ros2.base_transport import Other, Profile
+from handsteer.plugins.ros2.names import NodeName, dds_type_name, ros_type_name
 from handsteer.transports.base import UNNAMED
-from handsteer.transports.encoding import NodeName, dds_type_name, reply_type, request_type, ros_type_name
+from handsteer.transports.encoding import reply_type, request_type
 
 _USER_DATA = b"enclave=/;"
 _TICK_S = 0.25

@@ -17,7 +17,8 @@ from rosbags.interfaces import Nodetype
 
 from handsteer.messages import Topic, type_name
 from handsteer.plugins.ros2.base_transport import NO_DEADLINE, NO_LIVELINESS, Profile, offered, requested
-from handsteer.transports.encoding import dds_type_name, type_hash, types
+from handsteer.plugins.ros2.names import dds_type_name
+from handsteer.transports.encoding import type_hash, types
 
 _RELIABLE = Policy.Reliability.Reliable(0)
 _BEST_EFFORT = Policy.Reliability.BestEffort

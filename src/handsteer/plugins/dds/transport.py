@@ -24,7 +24,7 @@ from handsteer.plugins.dds.network import network
 from handsteer.plugins.dds.participant import Participant
 from handsteer.plugins.dds.topics import user_data
 from handsteer.plugins.ros2.base_transport import Other, Profile, Take, WireTransport
-from handsteer.transports.encoding import NodeName
+from handsteer.plugins.ros2.names import NodeName
 
 _REQUESTS_AT_ONCE = 100
 _WAIT_FOR_READER_S = 1.0

@@ -12,7 +12,7 @@ from typing import Any
 
 from handsteer import plain_yaml
 from handsteer.errors import TransportError
-from handsteer.transports.encoding import Remap
+from handsteer.plugins.ros2.names import Remap
 
 _RULE = re.compile(r"(?:(?P<node>[A-Za-z_]\w*):(?!//))?(?P<name>[^:]+|rostopic://[^:]+|rosservice://[^:]+)")
 _PARAMETER = re.compile(r"(?:(?P<node>/?[A-Za-z_][\w/]*):)?(?P<name>[A-Za-z_][\w.]*)")

@@ -13,9 +13,10 @@ from handsteer.messages import CLOCK, ClockMessage, Log, Time, Topic
 from handsteer.parameters import NodeParameters
 from handsteer.plugins.ros2.arguments import parse_arguments
 from handsteer.plugins.ros2.base_transport import WireTransport
+from handsteer.plugins.ros2.names import NodeName, identify
 from handsteer.plugins.ros2.parameter_services import PARAMETER_EVENTS, ParameterServices
 from handsteer.transports.base import Publisher, Received, Session
-from handsteer.transports.encoding import NodeName, decode, encode, identify, request_type
+from handsteer.transports.encoding import decode, encode, request_type
 from handsteer.transports.timing import ClockMonitor, ClockTimes
 
 _DELIVER_S = 0.2

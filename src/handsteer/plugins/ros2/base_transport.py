@@ -33,9 +33,10 @@ from handsteer.messages import (
     TwistStamped,
     type_name,
 )
+from handsteer.plugins.ros2.names import NodeName
 from handsteer.timeouts import STALE_S
 from handsteer.transports.base import Deliver, Received
-from handsteer.transports.encoding import MessageReader, NodeName, compile_type, decode, encode
+from handsteer.transports.encoding import MessageReader, compile_type, decode, encode
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
 from handsteer.transports.timing import StaleMessageFilter, StopOrder, capture_time
 

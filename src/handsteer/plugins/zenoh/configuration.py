@@ -12,7 +12,7 @@ from typing import Any
 import zenoh
 
 from handsteer.errors import TransportError
-from handsteer.transports.encoding import domain_id
+from handsteer.plugins.ros2.names import domain_id
 
 ROUTER = "tcp/localhost:7447"
 """Default address of the router."""

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import xxhash
 
 from handsteer.plugins.ros2.base_transport import Profile
-from handsteer.transports.encoding import NodeName, dds_type_name, ros_type_name, type_hash
+from handsteer.plugins.ros2.names import NodeName, dds_type_name, ros_type_name
+from handsteer.transports.encoding import type_hash
 
 _ROOT = "@ros2_lv"
 _NODE = "NN"

@@ -11,6 +11,7 @@ import zenoh
 
 from handsteer.errors import TransportError
 from handsteer.plugins.ros2.base_transport import Other, Profile, unconnected
+from handsteer.plugins.ros2.names import NodeName
 from handsteer.plugins.zenoh.configuration import Network, reason, routers
 from handsteer.plugins.zenoh.keys import (
     Endpoint,
@@ -22,7 +23,7 @@ from handsteer.plugins.zenoh.keys import (
     read_token,
     topic_key,
 )
-from handsteer.transports.encoding import NodeName, type_hash
+from handsteer.transports.encoding import type_hash
 
 _LOOK_AGAIN_S = 1.0
 _CHANGES_KEPT = 10_000

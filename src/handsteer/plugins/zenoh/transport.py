@@ -18,10 +18,10 @@ import zenoh.ext
 from handsteer.clock import Clock
 from handsteer.messages import Topic, type_name
 from handsteer.plugins.ros2.base_transport import IMAGES, Other, Profile, Take, WireTransport, offered
+from handsteer.plugins.ros2.names import NodeName
 from handsteer.plugins.zenoh.configuration import network
 from handsteer.plugins.zenoh.keys import attachment, gid, read_attachment
 from handsteer.plugins.zenoh.member import END_S, Member
-from handsteer.transports.encoding import NodeName
 
 # Zenoh sends on its own threads and does not report when they are done.
 _DELIVER_S = 0.1
