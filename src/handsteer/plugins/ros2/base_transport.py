@@ -34,11 +34,12 @@ from handsteer.messages import (
     type_name,
 )
 from handsteer.plugins.ros2.names import NodeName
+from handsteer.plugins.ros2.stop_order import StopOrder
 from handsteer.timeouts import STALE_S
 from handsteer.transports.base import Deliver, Received
 from handsteer.transports.encoding import MessageReader, compile_type, decode, encode
 from handsteer.transports.in_process import BasePublisher, BaseTransport, Receive
-from handsteer.transports.timing import StaleMessageFilter, StopOrder, capture_time
+from handsteer.transports.timing import StaleMessageFilter, capture_time
 
 M = TypeVar("M")
 
