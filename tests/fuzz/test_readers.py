@@ -40,6 +40,7 @@ from handsteer.plugins.page.editing import edit
 from handsteer.plugins.page.elements import read_words
 from handsteer.plugins.page.settings_fields import FIELDS
 from handsteer.plugins.page.steering_input import SteeringInput, read_deflection, read_number
+from handsteer.plugins.page.urdf import joints, visuals
 from handsteer.plugins.page.world_editor import read_file
 from handsteer.plugins.ros2.arguments import parse_arguments
 from handsteer.plugins.study.plan import read_plan
@@ -49,7 +50,7 @@ from handsteer.plugins.teach.evaluation.labels import read_photo_labels
 from handsteer.plugins.teach.exchange import read_class_names, read_keypoints
 from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
 from handsteer.recognition.shipped_signs import DEFAULT_MODEL, load_model
-from handsteer.robots.description import joints, robot_description, visuals
+from handsteer.robots.description import robot_description
 from handsteer.robots.world import load_world, parse_world
 from handsteer.transports.encoding import decode, encode
 from handsteer.types import SIGNS, Velocity

@@ -8,7 +8,7 @@ import yaml
 
 from handsteer import __version__
 from handsteer.config import RobotConfig
-from handsteer.robots.description import joints
+from handsteer.plugins.page.urdf import joints
 from tests.ros1.launches import ROS, ros_environment, run
 
 pytestmark = pytest.mark.ros1

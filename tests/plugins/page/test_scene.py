@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from handsteer.messages import Quaternion, yaw_of
 from handsteer.plugins.page.scene import about_axis, css_colour, from_quaternion, from_rpy, parents_first
-from handsteer.robots.description import Joint, joints, robot_description
+from handsteer.plugins.page.urdf import Joint, joints
+from handsteer.robots.description import robot_description
 
 ANGLES = st.floats(-math.pi, math.pi)
 PARTS = st.floats(-1, 1)

@@ -13,7 +13,8 @@ from playwright.sync_api import Page
 
 from handsteer.messages import JOINT_STATES, JointState
 from handsteer.plugins.page.scene import about_axis, from_rpy
-from handsteer.robots.description import joints, robot_description
+from handsteer.plugins.page.urdf import joints
+from handsteer.robots.description import robot_description
 from handsteer.robots.world import load_world, read_world
 from handsteer.transports.base import Received
 from tests.plugins.page.browsers import a_browser

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from handsteer.config import RobotConfig
+from handsteer.plugins.page.urdf import joints
 from handsteer.plugins.sim.physics import RANGE_MAX_M, SCAN_LINK
 from handsteer.plugins.sim.simulated import SimulatedRobot
 from handsteer.robots import RangeScan
-from handsteer.robots.description import joints, robot_description
+from handsteer.robots.description import robot_description
 from handsteer.robots.world import World
 
 

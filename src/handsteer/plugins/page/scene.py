@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from handsteer.errors import WorldError
 from handsteer.messages import Marker, Quaternion
 from handsteer.plugins.page.elements import STATIC
+from handsteer.plugins.page.urdf import Joint, Vector, joints, visuals
 from handsteer.plugins.page.world_state import TRAIL_POINTS, Point, Trail, WorldState
-from handsteer.robots.description import Joint, Vector, joints, visuals
 
 View = Literal["orbit", "follow", "top"]
 """``orbit`` follows the robot's position; ``follow`` also turns with it; ``top`` looks down, north (+y) up."""

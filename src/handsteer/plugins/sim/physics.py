@@ -21,13 +21,13 @@ The cylindrical wheels of the URDF touch only obstacles.
 
 import logging
 import math
+import xml.etree.ElementTree as ET
 
 import mujoco
 import numpy as np
 
 from handsteer.errors import WorldError
 from handsteer.robots import RangeScan, Shape
-from handsteer.robots.description import joints
 from handsteer.robots.world import Thing, World
 
 _log = logging.getLogger(__name__)
@@ -229,8 +229,8 @@ class Lidar:
     def __init__(self, model: mujoco.MjModel, urdf: str) -> None:
         self._model = model
         self._body = int(model.jnt_bodyid[model.joint(ROBOT_JOINT).id])
-        (mount,) = (joint for joint in joints(urdf) if joint.child == SCAN_LINK)
-        self._place = np.array(mount.xyz)
+        (mount,) = ET.fromstring(urdf).iterfind(f"joint/child[@link='{SCAN_LINK}']/../origin")
+        self._place = np.array(mount.get("xyz", "").split(), np.float64)
         angles = -math.pi + _INCREMENT * np.arange(RAYS)
         self._rays = np.stack([np.cos(angles), np.sin(angles), np.zeros(RAYS)], axis=1)
         self._seen = np.zeros(6, np.uint8)
