@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ from handsteer.plugins.teach.dataset import load_dataset
 from handsteer.plugins.teach.exchange import load_shared, read_class_names, read_keypoints
 from handsteer.recognition.custom_signs import load_custom_model
 from handsteer.recognition.shipped_signs import load_model
-from handsteer.regular_files import open_regular, read_regular
+from handsteer.regular_files import mode_of, open_regular, read_regular, replacing
 from handsteer.robots.world import load_world, parse_world
 
 READERS: dict[str, Callable[[Path], object]] = {
@@ -44,6 +45,20 @@ def test_a_regular_file_and_a_link_to_it_are_read(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="larger than") as refused:
         read_regular(file, 2)
     assert refused.value.strerror
+
+
+def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    with replacing(file, mode_of(file, 0o640)) as new:
+        new.write(b"first")
+        assert not file.exists()
+    assert (file.read_bytes(), mode_of(file, 0)) == (b"first", 0o640)
+    unfinished = ExitStack()
+    unfinished.enter_context(replacing(file, 0o600)).write(b"second")
+    assert len(list(tmp_path.iterdir())) == 2
+    assert not unfinished.__exit__(KeyboardInterrupt, KeyboardInterrupt(), None)
+    assert (file.read_bytes(), mode_of(file, 0)) == (b"first", 0o640)
+    assert [*tmp_path.iterdir()] == [file]
 
 
 @pytest.mark.timeout(60)

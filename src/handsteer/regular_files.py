@@ -1,4 +1,4 @@
-"""Opens files from outside: regular ones only, whose size is checked before anything is read.
+"""Opens files from outside: regular ones only, whose size is checked before anything is read; and replaces files.
 
 Reading a device may never end, and opening a named pipe waits for a writer.
 """
@@ -6,6 +6,9 @@ Reading a device may never end, and opening a named pipe waits for a writer.
 import errno
 import os
 import stat
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
@@ -44,3 +47,30 @@ def read_regular(path: Path, most_bytes: int) -> bytes:
     """
     with open_regular(path, most_bytes) as file:
         return file.read(most_bytes)
+
+
+@contextmanager
+def replacing(path: Path, mode: int) -> Iterator[BinaryIO]:
+    """Open a new file that replaces ``path``, even a link, when the block ends: as a whole or not at all.
+
+    Args:
+        path: The file.
+        mode: Its permissions, such as those of :func:`mode_of`.
+
+    Raises:
+        OSError: The folder does not exist, or there is no space.
+    """
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            yield file
+        Path(name).chmod(mode)
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def mode_of(path: Path, otherwise: int) -> int:
+    """Return the permissions of the file ``path``; ``otherwise`` if there is none."""
+    return stat.S_IMODE(path.stat().st_mode) if path.exists() else otherwise

@@ -28,7 +28,7 @@ from ai_edge_litert.interpreter import Interpreter
 from numpy.typing import NDArray
 
 from handsteer.errors import ModelCorrupt, ModelError, ModelMissing
-from handsteer.regular_files import read_regular
+from handsteer.regular_files import read_regular, replacing
 
 MODELS: Final = {
     "palm_detection_full.tflite": "1b14e9422c6ad006cde6581a46c8b90dd573c07ab7f3934b5589e7cea3f89a54",
@@ -220,16 +220,8 @@ def _check(name: str, content: bytes, message: str) -> None:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Write a file atomically."""
-    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as part:
-        try:
-            part.write(content)
-            part.close()
-            Path(part.name).chmod(0o644)
-            Path(part.name).replace(path)
-        except BaseException:
-            Path(part.name).unlink(missing_ok=True)
-            raise
+    with replacing(path, 0o644) as file:
+        file.write(content)
 
 
 @contextmanager

@@ -1,8 +1,6 @@
 """Reads untrusted .npz files: arrays only; nothing in them is executed."""
 
 import math
-import os
-import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer.errors import HandsteerError, quoted
-from handsteer.regular_files import open_regular
+from handsteer.regular_files import mode_of, open_regular, replacing
 
 Arrays = dict[str, NDArray[Any]]
 Content = TypeVar("Content")
@@ -93,15 +91,8 @@ class NpzFormat:
             OSError: The folder does not exist, or there is no space.
         """
         path = path.resolve()  # a link stays one
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                np.savez(file, format=np.array(self.version), **arrays)
-            Path(name).chmod(path.stat().st_mode if path.exists() else 0o644)
-            Path(name).replace(path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
+        with replacing(path, mode_of(path, 0o644)) as file:
+            np.savez(file, format=np.array(self.version), **arrays)
 
 
 class _RefusedError(Exception):

@@ -2,7 +2,6 @@
 
 import os
 import re
-import tempfile
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -17,7 +16,7 @@ from handsteer.parameters import plain
 from handsteer.plain_yaml import LARGEST_BYTES
 from handsteer.plugins.page.settings_fields import FIELDS, FORM, Field
 from handsteer.plugins.virtual_hand.script import parse_script
-from handsteer.regular_files import read_regular
+from handsteer.regular_files import mode_of, read_regular, replacing
 from handsteer.robots.world import load_world
 
 _COMMENT = re.compile(r"(^|\s)#", re.MULTILINE)
@@ -318,19 +317,10 @@ class SettingsFile:
     def _write(self, path: Path, content: bytes) -> None:
         path = path.resolve()  # a symbolic link stays one
         # Camera addresses may contain passwords: only the owner may read a new file.
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            like = path if path.exists() else self.path
-            if like.exists():
-                Path(name).chmod(like.stat().st_mode & 0o777)
-            Path(name).replace(path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
+        with replacing(path, mode_of(path, mode_of(self.path, 0o600))) as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
 
 
 def _in_order_of(old: bytes | None, values: Mapping[str, Any]) -> Any:
