@@ -63,7 +63,9 @@ class SignControl:
         self.silent = False
         action = action_of(sign, self._config.actions)
         self.velocity = (
-            self._next(sign, action, interval_s) if action in ACTIONS else self._added_to(action, interval_s)
+            self._next(action, interval_s)
+            if action in ACTIONS
+            else self._allowed(self._added.velocity(action, self.velocity, interval_s))
         )
         commanded = self._boosted() if action == "turbo" else self.velocity
         return commanded if commanded.is_finite else self.halt()
@@ -87,7 +89,7 @@ class SignControl:
         self._since_sign_s = 0.0
         return None if was_silent else ZERO
 
-    def _next(self, _sign: str, action: Action, interval_s: float) -> Velocity:
+    def _next(self, action: Action, interval_s: float) -> Velocity:
         now = self.velocity
         linear, angular = self._growth(interval_s)
         match action:
@@ -102,10 +104,6 @@ class SignControl:
         # Sums of steps are to be the expected decimals: 0.22, not 0.22000000000000006.
         summed = Velocity(round(after[0], _DIGITS), round(after[1], _DIGITS))
         return self._allowed(summed)
-
-    def _added_to(self, action: str, interval_s: float) -> Velocity:
-        """Return the next velocity by an action of a plug-in."""
-        return self._allowed(self._added.velocity(action, self.velocity, interval_s))
 
     def _allowed(self, wanted: Velocity) -> Velocity:
         """Return ``wanted`` within the limits; no faster than now if there are too many signs."""
