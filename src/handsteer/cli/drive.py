@@ -137,11 +137,8 @@ def summary_text(summary: Summary) -> str:
     if summary.trouble:
         lines.append(f"at the end, the robot {summary.trouble}")
     if summary.latency_median_ms is not None and summary.latency_p99_ms is not None:
-        median, p99 = (
-            f"{summary.latency_median_ms:.1f} ms (median)",
-            f"{summary.latency_p99_ms:.1f} ms (99th percentile)",
-        )
-        lines.append(f"capture to Twist: {median}, {p99}")
+        p99 = f"{summary.latency_p99_ms:.1f} ms (99th percentile)"
+        lines.append(f"capture to Twist: {summary.latency_median_ms:.1f} ms (median), {p99}")
     return "\n".join(lines)
 
 

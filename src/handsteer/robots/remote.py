@@ -106,11 +106,7 @@ class RemoteRobot:
             odometry=pose,
             linear_mps=0.0 if is_silent else velocity.linear_mps,
             angular_radps=0.0 if is_silent else velocity.angular_radps,
-            joint_positions={},
-            joint_velocities={},
             truth=pose,
-            contacts=(),
-            collisions=None,
             located=seen is not None and not is_silent,
             trouble=self._trouble(listens=listens, is_silent=is_silent),
         )
