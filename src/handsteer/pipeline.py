@@ -45,15 +45,12 @@ class FramePipeline:
 
     Args:
         recognizer: Recognises the signs.
-        joystick: The hand as a joystick.
-        pointing: Where the hand points.
-        gesture: Detects the gesture that engages.
+        config: Of the hand as a joystick, and of where it points; the defaults when None.
     """
 
-    def __init__(
-        self, recognizer: Recognizer, joystick: HandJoystick, pointing: Pointing, gesture: EngageGesture
-    ) -> None:
-        self.recognizer, self.joystick, self.pointing, self.gesture = recognizer, joystick, pointing, gesture
+    def __init__(self, recognizer: Recognizer, config: JoystickConfig | None = None) -> None:
+        self.recognizer = recognizer
+        self.joystick, self.pointing, self.gesture = HandJoystick(config), Pointing(config), EngageGesture()
         self._freshness = Freshness()
         self._unseen_s = 0.0
 

@@ -20,9 +20,6 @@ from handsteer.config import Config
 from handsteer.control import Control
 from handsteer.control.explain import Reason, seconds_to_renew, warned
 from handsteer.pipeline import FramePipeline, Sight
-from handsteer.recognition.engage_gesture import EngageGesture
-from handsteer.recognition.hand_joystick import HandJoystick
-from handsteer.recognition.pointing import Pointing
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.types import RELEASED, ZERO, Stick, Velocity
 
@@ -48,8 +45,7 @@ class Teleop:
     def __init__(self, config: Config | None = None, recognizer: Recognizer | None = None) -> None:
         config = config or Config()
         self.recognition: Recognition | None = None
-        sticks = HandJoystick(config.joystick), Pointing(config.joystick)
-        self._pipeline = FramePipeline(recognizer or Recognizer(config), *sticks, EngageGesture())
+        self._pipeline = FramePipeline(recognizer or Recognizer(config), config.joystick)
         self._max_frame_age_s = config.signs.max_frame_age
         self._refused: str | None = "no image has come"
         self._since_image_s = self._since_seen_s = 0.0

@@ -46,10 +46,7 @@ from handsteer.nodes.timing import (
     far_and_late,
 )
 from handsteer.pipeline import FramePipeline
-from handsteer.recognition.engage_gesture import EngageGesture
 from handsteer.recognition.hand import Hand
-from handsteer.recognition.hand_joystick import HandJoystick
-from handsteer.recognition.pointing import Pointing
 from handsteer.recognition.profile import profile_path
 from handsteer.recognition.recognizer import Recognition, Recognizer, annotate, open_classifier
 from handsteer.timeouts import PLAYED_S
@@ -122,8 +119,7 @@ class HandSignRecognitionNode(Node):
         self.counts: dict[str, int] = {}
         self.processing = LatencyLog()
         self.is_camera_far = False
-        sticks = HandJoystick(joystick), Pointing(joystick)
-        self._pipeline = FramePipeline(recognizer, *sticks, EngageGesture())
+        self._pipeline = FramePipeline(recognizer, joystick)
         self._points = points
         self._config = config
         self._models = _versions_of(config)
