@@ -211,7 +211,7 @@ class Control:
         if sign is not None:
             self._since_sign_s = 0.0
             self._stop_is_shown = action_of(sign, self._config.actions) == "stop"
-            self.mux.note_shown(sign)
+            self.mux.shown = sign or NONE
         elif self._lacks_signs:
             if self._since_sign_s < math.inf:
                 self.safety.fault("no sign came")
@@ -274,6 +274,7 @@ class TwistMux:
     Attributes:
         source: The active input.
         velocity: The last commanded velocity.
+        shown: The last sign, whether it is followed or not; ``NONE`` before the first one.
     """
 
     def __init__(self, config: ControlConfig) -> None:
@@ -281,7 +282,7 @@ class TwistMux:
         self._signs = SignControl(config)
         self._since_input_s = 0.0
         self._is_held = False
-        self._last_sign: str | None = None
+        self.shown = NONE
         self.velocity = ZERO
         self.source: Source = "none"
 
@@ -304,7 +305,7 @@ class TwistMux:
             return self._wait(dt_s, self._config.sign_timeout)
         velocity = self._signs.step(sign, dt_s)
         if sign is not None:
-            self.note_shown(sign)
+            self.shown = sign or NONE
         self.source = "none" if self._signs.silent else "signs"
         return self._take(velocity)
 
@@ -318,15 +319,6 @@ class TwistMux:
         self._config = config
         within = self.velocity.clamped(config.max_linear, config.max_angular)
         return self._take(within if self.source != "none" and within != self.velocity else None)
-
-    @property
-    def shown(self) -> str:
-        """The last sign of :meth:`note_shown`; ``NONE`` if there has not been one."""
-        return self._last_sign or NONE
-
-    def note_shown(self, sign: str) -> None:
-        """Record the sign that is shown, whether it is followed or not."""
-        self._last_sign = sign
 
     def hold_back(self, velocity: Velocity) -> None:
         """Continue from ``velocity``, a slower one that was commanded instead of the last."""
