@@ -98,14 +98,14 @@ def record_lap(page: Page, graph: Graph, camera: HandsCamera, path: Path) -> Non
         animate(shots(page, lambda: time.monotonic() > end_s or is_finished(graph)), path)
     finally:
         lap.stop()
-    course = graph.robot.course
+    course = graph.robot.surroundings.course
     if course is None or course.phase != "finished" or course.missed:
         sys.exit(f"the lap was not driven well: {course}; is the machine busy? Try again")
 
 
 def is_finished(graph: Graph) -> bool:
     """Return whether the robot has reached the end of its course."""
-    return graph.robot.course is not None and graph.robot.course.phase == "finished"
+    return graph.robot.surroundings.course is not None and graph.robot.surroundings.course.phase == "finished"
 
 
 def shots(page: Page, is_over: Callable[[], bool]) -> list[tuple[float, bytes]]:

@@ -65,7 +65,7 @@ class Summary:
             odometry=state.odometry if robot.was_located else None,
             path_length_m=robot.path_length_m,
             contacts=state.collisions,
-            course=robot.course,
+            course=robot.surroundings.course,
             trouble=state.trouble,
             callback_errors=sum(node.callback_errors for node in graph.nodes),
         )

@@ -171,16 +171,16 @@ def test_the_world_changes_while_the_robot_drives_and_it_stands_then() -> None:
     markers = bench.record(WORLD_MARKERS)
     bench.drive(1.0)
     where = robot.state.truth
-    done = robot.change_world(lambda world: add(world, "box", where))
+    done = robot.surroundings.change(lambda world: add(world, "box", where))
     assert not done.done()
     bench.run(0.06)
     assert done.result(0) is None
-    assert robot.world is not None
-    assert [thing.name for thing in robot.world.obstacles] == ["box 1"]
+    assert robot.surroundings.world is not None
+    assert [thing.name for thing in robot.surroundings.world.obstacles] == ["box 1"]
     assert abs(robot.state.linear_mps) < 0.02
     assert robot.state.truth.x == pytest.approx(where.x, abs=0.02)
     assert len(markers[-1].markers) == 1
-    robot.change_world(lambda world: remove(world, "box 1"))
+    robot.surroundings.change(lambda world: remove(world, "box 1"))
     bench.run(0.1)
     assert [marker.action for marker in markers[-1].markers] == [2]
 
@@ -189,36 +189,40 @@ def test_a_change_that_is_refused_changes_nothing() -> None:
     bench = RobotBench()
     robot = bench.robot
     refused = [
-        robot.change_world(lambda world: edit(add(world, "box", START), "box 1", {"position": [0, 0]})),
-        robot.change_world(lambda world: remove(world, "ghost")),
+        robot.surroundings.change(lambda world: edit(add(world, "box", START), "box 1", {"position": [0, 0]})),
+        robot.surroundings.change(lambda world: remove(world, "ghost")),
     ]
     bench.run(0.1)
     for future, words in zip(refused, ("overlaps the robot", "nothing called 'ghost'"), strict=True):
         with pytest.raises(WorldError, match=words):
             future.result(0)
-    assert robot.world == load_world("empty")
+    assert robot.surroundings.world == load_world("empty")
     assert robot.callback_errors == 0
 
 
 def test_changes_that_nobody_makes_do_not_pile_up() -> None:
     bench = RobotBench()
     robot = bench.robot
-    last = [robot.change_world(lambda world: world) for _ in range(20)][-1]
+    last = [robot.surroundings.change(lambda world: world) for _ in range(20)][-1]
     with pytest.raises(WorldError, match="too many changes wait"):
         last.result(0)
 
 
 def test_back_at_the_start_everything_counts_anew() -> None:
     bench = RobotBench(world="slalom")
-    robot = bench.robot
+    robot, surroundings = bench.robot, bench.robot.surroundings
     bench.drive(6.0)
-    assert robot.course is not None
-    assert (robot.course.phase, robot.course.passed) == ("running", 1)
-    robot.reset()
+    assert surroundings.course is not None
+    assert (surroundings.course.phase, surroundings.course.passed) == ("running", 1)
+    surroundings.reset()
     bench.run(0.1)
     assert (robot.state.truth.x, robot.state.truth.y, robot.path_length_m) == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
-    assert robot.course is not None
-    assert (robot.course.phase, robot.course.time_s, robot.state.collisions) == ("ready", 0.0, 0)
+    assert surroundings.course is not None
+    assert (surroundings.course.phase, surroundings.course.time_s, robot.state.collisions) == (
+        "ready",
+        0.0,
+        0,
+    )
     assert bench.newest.twist.twist.linear.x == pytest.approx(0.0, abs=1e-3)
 
 
@@ -227,12 +231,12 @@ def test_another_world_brings_its_course() -> None:
     robot = bench.robot
     reports = bench.record(DIAGNOSTICS)
     bench.drive(1.0)
-    before = robot.course
+    before = robot.surroundings.course
     assert before is None
-    robot.enter_world(load_world("slalom"))
+    robot.surroundings.enter(load_world("slalom"))
     bench.run(0.3)
-    assert robot.world == load_world("slalom")
-    assert robot.course == CourseState(8)
+    assert robot.surroundings.world == load_world("slalom")
+    assert robot.surroundings.course == CourseState(8)
     status = read_status(reports[-1].status[0])
     assert isinstance(status, RobotStatus)
     assert status.course == CourseState(8)

@@ -2,7 +2,6 @@
 
 import logging
 import math
-from concurrent.futures import Future
 from typing import Any
 
 import numpy as np
@@ -46,9 +45,8 @@ from handsteer.nodes.supervision import Rivals, StopKeeper
 from handsteer.nodes.surroundings import Surroundings
 from handsteer.nodes.timing import StallGuard
 from handsteer.robots import RangeScan, Robot, RobotState, Waiting
-from handsteer.robots.world import Change, World
 from handsteer.transports.base import Call, Received, Transport
-from handsteer.types import ZERO, CourseState, Pose2D, Velocity
+from handsteer.types import ZERO, Pose2D, Velocity
 
 log = logging.getLogger(__name__)
 
@@ -77,6 +75,7 @@ class RobotNode(Node):
         state: The robot's newest state.
         path_length_m: Distance actually driven, without turns in place.
         was_located: Whether its pose was ever known.
+        surroundings: The world around it, and what changes it.
     """
 
     def __init__(
@@ -112,36 +111,14 @@ class RobotNode(Node):
         self._rivals = Rivals(self, [cmd_vel], {config.cmd_vel_topic: robot.commanders})
         self.every(_PERIOD_S, self._step)
         self.every(_SCAN_PERIOD_S, self._publish_scan)
-        self._surroundings = Surroundings(
+        self.surroundings = Surroundings(
             self, robot, config.odom_frame_id, before_change=self._stand, after_restart=self._start_again
         )
         self.diagnose_every(_DIAGNOSE_PERIOD_S, self._report)
 
-    @property
-    def world(self) -> World | None:
-        """The robot's world, with all things in their initial places; None for a real robot."""
-        return self._surroundings.world
-
-    @property
-    def course(self) -> CourseState | None:
-        """The progress on the course of its world; None if there is no course."""
-        return self._surroundings.course
-
-    def change_world(self, change: Change) -> Future[None]:
-        """Stop the robot and change the world: see :meth:`~handsteer.nodes.surroundings.Surroundings.change`."""
-        return self._surroundings.change(change)
-
-    def enter_world(self, world: World) -> Future[None]:
-        """Move the robot to the start of another world; see :meth:`change_world`."""
-        return self._surroundings.enter(world)
-
-    def reset(self) -> Future[None]:
-        """Reset the robot and all things to their initial places; see :meth:`change_world`."""
-        return self._surroundings.reset()
-
     def services(self) -> dict[str, Call]:
         """Return those of the world around a simulated robot."""
-        return self._surroundings.services()
+        return self.surroundings.services()
 
     def on_stop(self) -> None:
         """Stop the robot, and close it even if it fails at that."""
@@ -188,7 +165,7 @@ class RobotNode(Node):
         self._robot.command(velocity.linear_mps, velocity.angular_radps)
 
     def _step(self) -> None:
-        self._surroundings.make_changes()
+        self.surroundings.make_changes()
         now = self.clock.now()
         elapsed_s, self._last_step_s = now - self._last_step_s, now
         self._notice_interruption(now)
@@ -196,7 +173,7 @@ class RobotNode(Node):
         self.state = self._robot.step(min(elapsed_s, _LONGEST_STEP_S))
         self.path_length_m += _distance_m(before, self.state)
         self.was_located |= self.state.located
-        self._surroundings.note(self.state)
+        self.surroundings.note(self.state)
         stamp = self.clock.stamp(now)
         header = Header(stamp=stamp, frame_id=self._config.odom_frame_id)
         base = self._config.base_frame_id
@@ -222,8 +199,8 @@ class RobotNode(Node):
             collisions=state.collisions,
             path_length_m=round(self.path_length_m, 2),
             truth=Pose2D(round(state.truth.x, 3), round(state.truth.y, 3), round(state.truth.yaw, 3)),
-            course=self._surroundings.course,
-            world=self.world.name if self.world is not None else "",
+            course=self.surroundings.course,
+            world=world.name if (world := self.surroundings.world) is not None else "",
             warning=self._rivals.warning or None,
             trouble=state.trouble,
             touches=state.contacts,

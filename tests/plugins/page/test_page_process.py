@@ -200,12 +200,12 @@ def test_the_world_is_changed_from_afar(near: Graph, far: RemoteGraph) -> None:
     far.change_world(partial(add, shape="box", robot=Pose2D(0.0, 0.0, 0.0))).result(30)
     assert far.state.world is not None
     (thing,) = far.state.world.obstacles
-    assert near.robot.world == far.state.world
+    assert near.robot.surroundings.world == far.state.world
     far.change_world(partial(remove, name=thing.name)).result(30)
     with pytest.raises(WorldError, match="nothing called 'box 1'"):
         far.change_world(partial(remove, name=thing.name)).result(30)
     far.enter_world(load_world("obstacles")).result(30)
-    assert near.robot.world == load_world("obstacles") == far.state.world
+    assert near.robot.surroundings.world == load_world("obstacles") == far.state.world
     far.reset().result(30)
 
 

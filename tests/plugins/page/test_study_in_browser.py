@@ -200,8 +200,9 @@ def test_only_the_driver_leads_by_the_input_of_the_condition_and_who_leaves_driv
         first.get_by_role("button", name="I agree").click()
         first.get_by_role("button", name="Continue").click()
         begin_lap(first)
-        visit.wait_until(lambda: visit.text(".banner .headline") == "Standing" and visit.graph.robot.course is not None)
-        assert len(robot.world.gates if robot.world else ()) == 2
+        around = robot.surroundings
+        visit.wait_until(lambda: visit.text(".banner .headline") == "Standing" and around.course is not None)
+        assert len(around.world.gates if around.world else ()) == 2
         assert not first.locator(".sliders").is_visible()
         first.keyboard.down("w")  # keys are another input
         second = visit.another_page()

@@ -200,10 +200,10 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
 
 def test_things_are_added_dragged_changed_deleted_saved_and_loaded(tmp_path: Path) -> None:
     with editing("empty") as visit:
-        page, robot = visit.page, visit.graph.robot
+        page, surroundings = visit.page, visit.graph.robot.surroundings
 
         def things() -> tuple[Any, ...]:
-            return robot.world.obstacles if robot.world else ()
+            return surroundings.world.obstacles if surroundings.world else ()
 
         page.get_by_role("button", name="Add a box").click()
         page.locator(".banner .headline", has_text="Stopped").wait_for()  # nothing drives it while it is edited
@@ -233,7 +233,7 @@ def test_things_are_added_dragged_changed_deleted_saved_and_loaded(tmp_path: Pat
         page.locator(".saved", has_text="unsaved changes").wait_for()
         page.get_by_label("Name of the world").fill("My course")
         page.get_by_label("Name of the world").press("Enter")
-        visit.wait_until(lambda: robot.world is not None and robot.world.name == "My course")
+        visit.wait_until(lambda: surroundings.world is not None and surroundings.world.name == "My course")
         visit.wait_until(lambda: "My course" in visit.text(".files .q-select"))
         with page.expect_download() as download:
             press(page, "Save file")
@@ -241,41 +241,44 @@ def test_things_are_added_dragged_changed_deleted_saved_and_loaded(tmp_path: Pat
         path = tmp_path / download.value.suggested_filename
         download.value.save_as(path)
         assert path.name == "My course.yaml"
-        assert read_world(path) == robot.world
-        saved = robot.world
+        assert read_world(path) == surroundings.world
+        saved = surroundings.world
         page.get_by_role("button", name="Delete the chosen").click()
         visit.wait_until(lambda: things() == ())
         page.locator("input[type=file]").set_input_files(path)
-        visit.wait_until(lambda: robot.world == saved)
+        visit.wait_until(lambda: surroundings.world == saved)
 
         bad = tmp_path / "bad.yaml"
         bad.write_text("obstacles: [{shape: '<b>cone</b>', name: a}]")
         page.locator("input[type=file]").set_input_files(bad)
         page.locator(".bar .message", has_text="not <b>cone</b>").wait_for()
-        assert robot.world == saved
+        assert surroundings.world == saved
         assert visit.troubles == []
 
 
 def test_walls_and_gates_are_drawn_undone_and_made_again() -> None:
     with editing("empty") as visit:
-        page, robot = visit.page, visit.graph.robot
+        page, surroundings = visit.page, visit.graph.robot.surroundings
 
         def names() -> list[str]:
-            world = robot.world
+            world = surroundings.world
             return [each.name for each in (*world.obstacles, *world.gates)] if world else []
 
         press(page, "Wall")
         drag(page, (1.02, 1.01), (2.03, 1.1))
         visit.wait_until(lambda: names() == ["wall 1"])
-        assert robot.world
-        wall = robot.world.obstacles[0]
+        assert surroundings.world
+        wall = surroundings.world.obstacles[0]
         assert (wall.position, wall.yaw, wall.extent) == ((1.5, 1.0), 0.0, (1.0, 0.1, 0.5))  # on the grid, and straight
         press(page, "Gate")
         drag(page, (1.5, 0.6), (1.5, -0.6))
         visit.wait_until(lambda: names() == ["wall 1", "gate 1"])
         drag(page, (2.0, -0.6), (2.0, 0.6))
         visit.wait_until(lambda: names() == ["wall 1", "gate 1", "gate 2"])
-        assert (robot.world.gates[0].left, robot.world.gates[0].right) == ((1.5, 0.6), (1.5, -0.6))
+        assert (surroundings.world.gates[0].left, surroundings.world.gates[0].right) == (
+            (1.5, 0.6),
+            (1.5, -0.6),
+        )
         page.get_by_label("Pass this gate earlier").click()
         visit.wait_until(lambda: names() == ["wall 1", "gate 2", "gate 1"])
 
@@ -294,7 +297,7 @@ def test_walls_and_gates_are_drawn_undone_and_made_again() -> None:
         page.get_by_label("Which world to load").click()
         page.get_by_role("option", name="slalom").click()
         page.get_by_role("button", name="Load the chosen world").click()
-        visit.wait_until(lambda: robot.world == load_world("slalom"))
+        visit.wait_until(lambda: surroundings.world == load_world("slalom"))
         visit.wait_until(lambda: page.get_by_label("Name of the world").input_value() == "slalom")
         visit.wait_until(lambda: page.locator(".plan .gate").count() == 8)
         page.get_by_label("Undo the last change").click()  # what was not saved is not lost
@@ -339,7 +342,7 @@ def test_the_course_counts_gates_and_bumps_and_only_the_driver_edits(tmp_path: P
         other.goto(f"{page.url.rstrip('/')}/world")
         other.get_by_role("button", name="Add a box").click()
         other.locator(".bar .message", has_text="Another viewer drives").wait_for()
-        assert robot.world == read_world(world)
+        assert robot.surroundings.world == read_world(world)
         other.close()
 
         press(page, "Back to start")

@@ -84,9 +84,9 @@ class GraphServer:
         graph.recording.on_change = self._send_state
         self._actions: dict[str, Callable[..., Future[None] | None]] = {
             "reconfigure": lambda config, by: self._setting.submit(graph.reconfigure, config, by),
-            "change_world": graph.robot.change_world,
-            "enter_world": graph.robot.enter_world,
-            "reset": graph.robot.reset,
+            "change_world": graph.robot.surroundings.change,
+            "enter_world": graph.robot.surroundings.enter,
+            "reset": graph.robot.surroundings.reset,
             "choose_camera": graph.choose_camera,
             "find_cameras": lambda: self._finding.submit(graph.cameras.find),
             "forget_browser": graph.cameras.browser.forget,
@@ -112,7 +112,7 @@ class GraphServer:
         graph = self._graph
         cameras, recording = graph.cameras, graph.recording.state
         chosen = (cameras.source, cameras.size, cameras.choices)
-        return GraphState(graph.config, graph.robot.world, *chosen, cameras.browser.is_given, recording)
+        return GraphState(graph.config, graph.robot.surroundings.world, *chosen, cameras.browser.is_given, recording)
 
     def _send_state(self) -> None:
         with self._sending:

@@ -336,7 +336,7 @@ def test_the_worlds_are_those_that_it_drove_in(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_world_that_was_loaded_before_the_recording_is_named(tmp_path: Path) -> None:
     with Graph(Config(), SteppedClock()) as graph:
-        loaded = graph.robot.enter_world(rename(load_world("slalom"), "Mine"))
+        loaded = graph.robot.surroundings.enter(rename(load_world("slalom"), "Mine"))
         graph.run_stepped(0.5)
         loaded.result(0)
         graph.record(tmp_path / "drive.mcap")
