@@ -14,7 +14,7 @@ import numpy as np
 from rosbags.typesys.stores import ros2_jazzy as ros2
 
 from handsteer.timeouts import STALE_S
-from handsteer.types import ALWAYS_STOP, RELEASED, CmdVelType, Stick
+from handsteer.types import ALWAYS_STOP, RELEASED, CmdVelType, Pose2D, Stick, Velocity
 
 Duration = ros2.builtin_interfaces__msg__Duration
 Time = ros2.builtin_interfaces__msg__Time
@@ -123,8 +123,7 @@ NO_STAMP = Time(sec=0, nanosec=0)
 
 def is_zero(message: "Twist | TwistStamped") -> bool:
     """Return whether a velocity command is zero."""
-    command = twist_in(message)
-    return command.linear.x == 0.0 and command.angular.z == 0.0
+    return velocity_in(message).is_zero
 
 
 def is_set(message: Bool) -> bool:
@@ -225,6 +224,17 @@ def command(topic: Topic[Any], linear_mps: float, angular_radps: float, stamp: T
 def twist_in(message: Twist | TwistStamped) -> Twist:
     """Return the twist in a velocity command."""
     return message.twist if isinstance(message, TwistStamped) else message
+
+
+def velocity_in(message: Twist | TwistStamped) -> Velocity:
+    """Return the velocity in a command, or in the twist of an odometry."""
+    bare = twist_in(message)
+    return Velocity(bare.linear.x, bare.angular.z)
+
+
+def pose_in(message: Pose) -> Pose2D:
+    """Return the pose on the floor."""
+    return Pose2D(message.position.x, message.position.y, yaw_of(message.orientation))
 
 
 def joy_of(stick: Stick, header: Header, *, engages: bool = False, pointing: Stick = RELEASED) -> Joy:

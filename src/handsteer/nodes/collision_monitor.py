@@ -10,7 +10,7 @@ from handsteer.control.assist import assist_named, held_back
 from handsteer.control.explain import Reason
 from handsteer.control.footprint import points_of
 from handsteer.control.obstacles import ObstacleLimiter
-from handsteer.messages import LaserScan, Odometry, Pose, Topic
+from handsteer.messages import LaserScan, Odometry, Pose, Topic, velocity_in
 from handsteer.nodes.base import Node
 from handsteer.nodes.frozen_scans import FrozenScans, MixedScans
 from handsteer.transports.base import Received
@@ -39,8 +39,7 @@ class MeasuredVelocity:
         One that no robot has, above 25 m/s or 60 rad/s, is not finite; nor is that with a pose that is not finite,
         because odometry that is wrong in one part is not to be believed in the other.
         """
-        twist, pose = odometry.twist.twist, odometry.pose.pose
-        velocity = Velocity(twist.linear.x, twist.angular.z)
+        velocity, pose = velocity_in(odometry.twist.twist), odometry.pose.pose
         if velocity != velocity.clamped(_FASTEST.linear_mps, _FASTEST.angular_radps) or not _is_finite(pose):
             return _NOT_VALID
         has_moved, self._pose = self._pose not in (None, pose), pose

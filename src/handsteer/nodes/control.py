@@ -33,6 +33,7 @@ from handsteer.messages import (
     engages_in,
     pointing_in,
     stick_in,
+    velocity_in,
 )
 from handsteer.nodes.auditing import ControlAudit
 from handsteer.nodes.base import Node
@@ -261,8 +262,7 @@ class HandSignControlNode(Node):
         return is_old or is_of_other or received.is_late
 
     def _on_steering(self, received: Received[Twist]) -> None:
-        wanted = Velocity(received.message.linear.x, received.message.angular.z)
-        self._steer(wanted, is_late=received.is_late, by="steering")
+        self._steer(velocity_in(received.message), is_late=received.is_late, by="steering")
 
     def _steer(self, wanted: Velocity, *, is_late: bool, by: SteeredBy) -> None:
         self._take(None, is_late=is_late, is_stop=wanted.is_zero, steering=wanted, by=by)

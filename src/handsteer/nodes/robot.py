@@ -37,7 +37,7 @@ from handsteer.messages import (
     Vector3,
     is_zero,
     twist,
-    twist_in,
+    velocity_in,
 )
 from handsteer.nodes.base import Node
 from handsteer.nodes.status import RobotStatus
@@ -132,8 +132,7 @@ class RobotNode(Node):
         self._notice_interruption(now)
         if not is_zero(received.message) and (self._stall_guard.distrusts(now) or self._is_old(received.message, now)):
             return
-        command = twist_in(received.message)
-        self._drive(Velocity(command.linear.x, command.angular.z))
+        self._drive(velocity_in(received.message))
 
     def _is_old(self, message: Twist | TwistStamped, now: float) -> bool:
         """Return whether a stamped command is too old to be obeyed, as in ROS's diff_drive_controller."""

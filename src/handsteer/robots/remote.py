@@ -8,7 +8,17 @@ from functools import partial
 from typing import Any
 
 from handsteer.config import RobotConfig
-from handsteer.messages import CMD_VEL, SAME_SCANNER_RAD, LaserScan, Odometry, Topic, TurtlePose, type_name, yaw_of
+from handsteer.messages import (
+    CMD_VEL,
+    SAME_SCANNER_RAD,
+    LaserScan,
+    Odometry,
+    Topic,
+    TurtlePose,
+    pose_in,
+    type_name,
+    velocity_in,
+)
 from handsteer.robots import Obstacle, RangeScan, RobotState
 from handsteer.robots.command_limiter import CommandLimiter
 from handsteer.robots.description import robot_description
@@ -213,9 +223,7 @@ def _full_name(session: Session, name: str) -> str:
 
 
 def _of_odometry(message: Odometry, at_s: float) -> _Seen:
-    at, turned = message.pose.pose.position, message.pose.pose.orientation
-    moving = message.twist.twist
-    return _Seen(Pose2D(at.x, at.y, yaw_of(turned)), Velocity(moving.linear.x, moving.angular.z), at_s)
+    return _Seen(pose_in(message.pose.pose), velocity_in(message.twist.twist), at_s)
 
 
 def _of_turtle(message: TurtlePose, at_s: float) -> _Seen:

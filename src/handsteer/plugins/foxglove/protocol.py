@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from handsteer.errors import LiveError
-from handsteer.messages import Topic, Twist, type_name
+from handsteer.messages import Topic, Twist, type_name, velocity_in
 from handsteer.transports.encoding import decode, message_definition
 from handsteer.types import Velocity
 
@@ -175,8 +175,7 @@ def read_command(content: bytes, encoding: str) -> Velocity:
     """
     try:
         if encoding == "cdr":
-            twist: Twist = decode(content, type_name(Twist))
-            velocity = Velocity(twist.linear.x, twist.angular.z)
+            velocity = velocity_in(decode(content, type_name(Twist)))
         else:
             sent = json.loads(content)
             velocity = Velocity(_speed(sent, "linear", "x"), _speed(sent, "angular", "z"))

@@ -27,8 +27,8 @@ from handsteer.messages import (
     Topic,
     Twist,
     TwistStamped,
-    twist_in,
-    yaw_of,
+    pose_in,
+    velocity_in,
 )
 from handsteer.nodes.base import Node
 from handsteer.nodes.diagnostics import read_status, split_reporter
@@ -268,8 +268,7 @@ class DashboardNode(Node):
             self.world = replace(self.world, trail=self.world.trail.restarted())
 
     def _on_command(self, received: Received[Twist | TwistStamped]) -> None:
-        twist = twist_in(received.message)
-        self._note_command(Velocity(twist.linear.x, twist.angular.z))
+        self._note_command(velocity_in(received.message))
 
     def _take_command(self, status: ControlStatus) -> None:
         if self._believes_control and status.source != "none":
@@ -284,9 +283,8 @@ class DashboardNode(Node):
 
     def _on_odometry(self, received: Received[Odometry]) -> None:
         odometry = received.message
-        measured = Velocity(odometry.twist.twist.linear.x, odometry.twist.twist.angular.z)
+        measured, pose = velocity_in(odometry.twist.twist), pose_in(odometry.pose.pose)
         self._observed = replace(self._observed, measured=measured, measured_came_s=self.clock.now())
-        pose = _pose_of(odometry)
         self._odometry.append((to_seconds(odometry.header.stamp), pose))
         robot = place_in_world(*self._truth, pose) if self._truth else pose
         arc = arc_points(self._command(self.clock.now()) or ZERO, robot)
@@ -320,8 +318,3 @@ def _drawn(markers: tuple[Marker, ...]) -> list[tuple[object, ...]]:
 
 def _reporter(message: DiagnosticArray) -> tuple[str, ...]:
     return tuple(status.name for status in message.status)
-
-
-def _pose_of(odometry: Odometry) -> Pose2D:
-    pose = odometry.pose.pose
-    return Pose2D(pose.position.x, pose.position.y, yaw_of(pose.orientation))

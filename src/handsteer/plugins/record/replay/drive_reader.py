@@ -21,7 +21,7 @@ from handsteer.messages import (
     STOP,
     STOPPED,
     WORLD_MARKERS,
-    twist_in,
+    velocity_in,
 )
 from handsteer.nodes.diagnostics import read_status
 from handsteer.nodes.journal import journal_topic
@@ -32,7 +32,7 @@ from handsteer.plugins.record.replay.drive_logs import MapThings, RobotLog, Sign
 from handsteer.plugins.record.replay.journals import parse_spin
 from handsteer.plugins.record.replay.reason_log import ReasonLog
 from handsteer.plugins.record.replay.stand_log import StandLog
-from handsteer.types import NONE, Velocity
+from handsteer.types import NONE
 
 _CONTROL = "hand_sign_control"
 _FARTHEST_S = 24 * 3600.0
@@ -161,8 +161,8 @@ class _Reader:
             return self._on_odometry if self._is_first(kind, topic) else None
         endings = {
             HAND_SIGN.name: ("String", self._on_sign),
-            GESTURE_JOY.name: ("Joy", self._on_joystick),
-            JOY.name: ("Joy", self._on_gamepad),
+            GESTURE_JOY.name: ("Joy", lambda joy, time_s: self._reasons.note_joystick(time_s, joy.message)),
+            JOY.name: ("Joy", lambda joy, time_s: self._reasons.note_gamepad(time_s, joy.message)),
             STOP.name: ("Bool", self._on_stop),
             STOPPED.name: ("Bool", self._on_stopped),
             WORLD_MARKERS.name: ("MarkerArray", self._on_markers),
@@ -190,16 +190,10 @@ class _Reader:
         self._reasons.note_sign(time_s, self._signs.sign)
 
     def _on_steering(self, recorded: Recorded, time_s: float) -> None:
-        self._reasons.note_steering(time_s, _velocity(recorded))
-
-    def _on_joystick(self, recorded: Recorded, time_s: float) -> None:
-        self._reasons.note_joystick(time_s, recorded.message)
-
-    def _on_gamepad(self, recorded: Recorded, time_s: float) -> None:
-        self._reasons.note_gamepad(time_s, recorded.message)
+        self._reasons.note_steering(time_s, velocity_in(recorded.message))
 
     def _on_command(self, recorded: Recorded, time_s: float) -> None:
-        velocity = _velocity(recorded)
+        velocity = velocity_in(recorded.message)
         if not (abs(velocity.linear_mps) < _LARGEST and abs(velocity.angular_radps) < _LARGEST):
             raise RecordingError(f"a velocity that is not finite: {velocity}")
         self._facts.commands += 1
@@ -313,11 +307,6 @@ class _Reader:
             facts.latencies_ms = Curve(2)
         elif not len(facts.latencies_ms):
             facts.no_latency = "no command followed from a frame"
-
-
-def _velocity(recorded: Recorded) -> Velocity:
-    twist = twist_in(recorded.message)
-    return Velocity(twist.linear.x, twist.angular.z)
 
 
 def _recorded_rules(about: Mapping[str, str]) -> tuple[ControlConfig | None, JoyConfig | None]:
