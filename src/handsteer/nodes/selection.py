@@ -9,7 +9,6 @@ from handsteer.config.driving import NEXT
 from handsteer.errors import quoted
 from handsteer.messages import SELECT_ROBOT, SELECTED_ROBOT, String, Topic
 from handsteer.nodes.base import Node
-from handsteer.transports.base import Received
 from handsteer.transports.commands import Commands
 
 log = logging.getLogger(__name__)
@@ -53,7 +52,7 @@ class Selection:
         self._left: dict[str, int] = {}
         self._selected = node.publisher(SELECTED_ROBOT)
         self._selected.publish(String(data=self.robot))
-        node.subscribe(SELECT_ROBOT, self._on_select)
+        node.subscribe(SELECT_ROBOT, lambda received: self.select(received.message.data.strip()))
 
     @property
     def commands(self) -> Commands:
@@ -94,6 +93,3 @@ class Selection:
     def forget(self) -> None:
         """Send nothing more to robots that were selected a moment ago."""
         self._left.clear()
-
-    def _on_select(self, received: Received[String]) -> None:
-        self.select(received.message.data.strip())

@@ -40,7 +40,7 @@ class StopKeeper:
         node.every(HEAR_STOP_S, self._settle).delay_until(self._waits_until_s)
         # Several nodes publish at once: one's true must not be replaced by another's false.
         node.subscribe(STOPPED, self._on_word_of_others, key=lambda message: bool(message.data))
-        node.subscribe(STOP, self._on_stop_or_reset)
+        node.subscribe(STOP, lambda received: self._take(bool(received.message.data)))
 
     @property
     def waits_for_others(self) -> bool:
@@ -51,9 +51,6 @@ class StopKeeper:
         if self._node.clock.now() >= self._waits_until_s:
             return False
         return len(self._node.transport.publishers_of(STOPPED)) != 1
-
-    def _on_stop_or_reset(self, received: Received[Bool]) -> None:
-        self._take(bool(received.message.data))
 
     def _on_word_of_others(self, received: Received[Bool]) -> None:
         self._waits_until_s = -math.inf
