@@ -2,7 +2,7 @@
 
 ``remote`` is a real robot behind a topic, whose commands a pure part computes (``command_limiter``). ``handsteer run``
 joins that robot's graph in addition to its own, in which it is the node ``robot`` like a simulated one. ``world`` is a
-world in YAML, ``editing`` changes it, and ``course`` has its gates.
+world in YAML, and ``course`` counts its gates.
 """
 
 from dataclasses import dataclass, field
