@@ -9,7 +9,6 @@ from handsteer.control import TwistMux
 from handsteer.control.sign_control import SignControl
 from handsteer.types import (
     ACTIONS,
-    EFFECTS,
     FORWARD,
     GO,
     MOTION_SIGNS,
@@ -50,10 +49,6 @@ def test_without_a_table_the_motion_signs_are_the_built_in_ones() -> None:
 )
 def test_a_name_means_a_sign_whatever_its_case_spaces_and_unicode_form(name: str, sign: str | None) -> None:
     assert find_sign(name, (*SIGNS, "Cafe\u0301")) == sign
-
-
-def test_every_action_is_described() -> None:
-    assert set(EFFECTS) == set(ACTIONS)
 
 
 @pytest.mark.parametrize(

@@ -76,28 +76,6 @@ ACTIONS: tuple[Action, ...] = get_args(Action)
 MOTION_ACTIONS: frozenset[Action] = frozenset({"forward", "backward", "turn_left", "turn_right", "turbo"})
 """The actions that can make a robot move, or move faster."""
 
-EFFECTS: dict[Action, str] = {
-    "forward": "faster forward; turning ends",
-    "backward": "slower, then backward; turning ends",
-    "turn_left": "turns faster to the left; keeps its speed",
-    "turn_right": "turns faster to the right; keeps its speed",
-    "stop": "stops",
-    "go": "goes on as it does",
-    "turbo": "twice as fast while shown, within the limits",
-    "next_robot": "the next robot is driven, once Stop was shown",
-}
-"""The effect of each action on the robot, in words."""
-
-POINT_EFFECTS: Mapping[Action, str] = EFFECTS | {
-    "forward": "drives where it points; raise the hand to go faster",
-    "backward": "drives back where it points; raise the hand to go faster",
-    "turn_left": "turns left in place",
-    "turn_right": "turns right in place",
-    "go": "drives straight on; keeps its speed",
-    "turbo": "goes on as it does",
-}
-"""The same with ``control.rule: point``."""
-
 BUILT_IN: Mapping[str, Action] = {
     FORWARD: "forward",
     BACKWARD: "backward",

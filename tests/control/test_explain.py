@@ -3,8 +3,7 @@ from typing import get_args
 
 import pytest
 
-from handsteer.config import ControlConfig
-from handsteer.control.explain import Reason, ReasonCode, effect_of, seconds_to_renew, warned
+from handsteer.control.explain import Reason, ReasonCode, seconds_to_renew, warned
 
 
 @pytest.mark.parametrize(
@@ -38,15 +37,3 @@ def test_every_reason_has_words(code: ReasonCode) -> None:
 )
 def test_the_driver_is_warned_before_a_sign_has_to_be_shown_anew(left_s: float, warning: str) -> None:
     assert warned("Forward", seconds_to_renew(left_s)) == f"Forward{warning}"
-
-
-def test_an_effect_names_step_and_limit() -> None:
-    assert effect_of("turn_left", ControlConfig()).endswith("(0.1 rad/s a frame, up to 2 rad/s)")
-    assert effect_of("stop", ControlConfig()) == "stops"
-
-
-def test_an_effect_is_that_of_the_rule() -> None:
-    point = ControlConfig(rule="point", point_turn=0.8, max_linear=0.6)
-    assert effect_of("forward", point) == ("drives where it points; raise the hand to go faster (up to 0.6 m/s)")
-    assert effect_of("turn_left", point) == "turns left in place (up to 0.8 rad/s)"
-    assert effect_of("go", point) == "drives straight on; keeps its speed"

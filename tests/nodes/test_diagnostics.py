@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 from handsteer.clock import to_stamp
 from handsteer.config import ControlConfig
 from handsteer.control import Source
-from handsteer.control.explain import Reason, ReasonCode, effect_of
+from handsteer.control.explain import Reason, ReasonCode
 from handsteer.messages import DiagnosticStatus, KeyValue
 from handsteer.nodes.diagnostics import read_status, split_reporter, write_status
 from handsteer.nodes.status import CameraStatus, ControlStatus, RecognitionStatus, RobotStatus, Status
+from handsteer.plugins.teach.effects import effect_of
 from handsteer.types import ACTIONS, SIGNS, CourseState, Pose2D, action_of
 
 TEXTS = st.text(max_size=30)

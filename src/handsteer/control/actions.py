@@ -44,11 +44,3 @@ class AddedActions:
                 self._failed.add((name, type(error)))
                 log.exception("the action %s has failed: the robot stops", name)
             return ZERO
-
-
-def added_effect(action: str) -> str:
-    """Return the effect of an action of a plug-in, in words."""
-    try:
-        return str(doors.ACTIONS.load(action).effect)
-    except (PluginError, AttributeError):
-        return action.replace("_", " ")

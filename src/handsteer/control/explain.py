@@ -1,13 +1,10 @@
-"""Explains in words why the robot drives or stands, and what signs do, with the configured values."""
+"""Explains in words why the robot drives or stands."""
 
 import math
 from dataclasses import dataclass
 from typing import Literal
 
-from handsteer.config import ControlConfig
-from handsteer.control.actions import added_effect
 from handsteer.timeouts import RENEW_WARNING_S
-from handsteer.types import EFFECTS, POINT_EFFECTS, Action
 
 ReasonCode = Literal[
     "sign",
@@ -126,31 +123,3 @@ def seconds_to_renew(left_s: float) -> int | None:
 def warned(explanation: str, renew_s: int | None) -> str:
     """Return ``explanation`` with the warning that what drives must change within ``renew_s`` seconds, if any."""
     return explanation if renew_s is None else f"{explanation}; stops in {renew_s} s unless it changes"
-
-
-def effect_of(action: Action, rule: ControlConfig) -> str:
-    """Return the effect of ``action`` on the robot under ``rule``, with steps and limits; for example ``stops``."""
-    figures, words = figures_of(action, rule), effect_words(action, rule)
-    return f"{words} ({figures})" if figures else words
-
-
-def effect_words(action: Action, rule: ControlConfig | None) -> str:
-    """Return the effect of ``action`` under ``rule``, without figures; None is the default rule."""
-    if action not in EFFECTS:
-        return added_effect(action)
-    return (POINT_EFFECTS if rule and rule.rule == "point" else EFFECTS)[action]
-
-
-def figures_of(action: Action, rule: ControlConfig) -> str:
-    """Return the step and the limit of ``action`` under ``rule``; empty if it has none."""
-    max_angular, is_timed = rule.max_angular, rule.ramp == "per_second"
-    linear = f"{rule.linear_acceleration:g} m/s a second" if is_timed else f"{rule.linear_step:g} m/s a frame"
-    angular = f"{rule.angular_acceleration:g} rad/s a second" if is_timed else f"{rule.angular_step:g} rad/s a frame"
-    if rule.rule == "point" and action in ("forward", "backward", "turn_left", "turn_right"):
-        is_turn = action.startswith("turn")
-        return f"up to {min(rule.point_turn, max_angular):g} rad/s" if is_turn else f"up to {rule.max_linear:g} m/s"
-    if action in ("forward", "backward"):
-        return f"{linear}, up to {rule.max_linear:g} m/s"
-    if action in ("turn_left", "turn_right"):
-        return f"{angular}, up to {max_angular:g} rad/s"
-    return f"up to {rule.max_linear:g} m/s" if action == "turbo" else ""

@@ -12,8 +12,9 @@ from handsteer.parameters import section_model
 from handsteer.plugins.page.elements import STATIC
 from handsteer.plugins.page.languages import LANGUAGES, preferred_language
 from handsteer.plugins.page.settings_fields import FIELDS, SECTION_TITLES
+from handsteer.plugins.teach.effects import EFFECTS
 from handsteer.robots.world import load_world, shipped_worlds
-from handsteer.types import EFFECTS, SIGNS
+from handsteer.types import SIGNS
 
 OTHERS = sorted(LANGUAGES - {"en"})
 PLACE = re.compile(r"\{\}|#")

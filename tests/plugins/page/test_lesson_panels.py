@@ -24,9 +24,10 @@ from handsteer.plugins.page.lesson_state import (
 )
 from handsteer.plugins.teach.collect import Facts, Status
 from handsteer.plugins.teach.dataset import Dataset
+from handsteer.plugins.teach.effects import EFFECTS
 from handsteer.plugins.teach.evaluation.intervals import Share
 from handsteer.plugins.teach.report import Mistake
-from handsteer.types import EFFECTS, NONE, Action
+from handsteer.types import NONE, Action
 from tests.plugins.page.served import Site
 from tests.plugins.teach.takes import take
 

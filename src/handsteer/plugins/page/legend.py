@@ -10,13 +10,13 @@ from urllib.parse import quote
 from nicegui import ui
 
 from handsteer.config import ControlConfig, SignsConfig
-from handsteer.control.explain import effect_words, figures_of
 from handsteer.plugins.page.elements import box, button, switch, tag, text
 from handsteer.plugins.page.page import Page
 from handsteer.plugins.page.settings import Settings
 from handsteer.plugins.page.settings_fields import FIELDS
 from handsteer.plugins.page.sign_pictures import DRAWN, MOVED_FIST, SIGN_PATH, TAUGHT, taught_drawings
 from handsteer.plugins.page.state import PageState
+from handsteer.plugins.teach.effects import effect_words, figures_of
 from handsteer.types import GO, SIGNS, STOP, action_of
 
 _MOVE = "Move it"

@@ -6,13 +6,13 @@ from typing import Final
 
 from nicegui import ui
 
-from handsteer.control.explain import effect_words
 from handsteer.plugins.page.elements import box, button, sentence, switch, tag, text
 from handsteer.plugins.page.lesson import MOST_TAKES, Lesson
 from handsteer.plugins.page.lesson_panels import ViewerLesson, set_words
 from handsteer.plugins.page.lesson_state import Collected, LessonState, Seen, SignClass, counted
 from handsteer.plugins.page.sign_pictures import DRAWN, draw_hand
 from handsteer.plugins.teach.dataset import typical_hand
+from handsteer.plugins.teach.effects import effect_words
 from handsteer.types import NONE, Action
 
 _SHOWN: Final = 8

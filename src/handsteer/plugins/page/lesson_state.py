@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from handsteer.control.explain import effect_words
 from handsteer.plugins.teach.collect import Status
 from handsteer.plugins.teach.dataset import Take
+from handsteer.plugins.teach.effects import effect_words
 from handsteer.plugins.teach.report import TrainingReport
 from handsteer.plugins.teach.train import training_rows
 from handsteer.recognition.custom_signs import CustomModel

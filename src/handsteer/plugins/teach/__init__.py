@@ -4,8 +4,8 @@
 train in a separate process (``background``), which blocks neither the interpreter nor all processors. ``calibration``
 makes a person's profile (docs/calibrate.md). ``evaluation`` reads labelled pictures, landmarks and videos
 (docs/signs-evaluate.md). ``onnx_file`` writes taught signs for ONNX Runtime, with the features as a graph: a change to
-those of ``recognition.features`` or ``recognition.custom_signs`` is made there too, which its tests check. ``terminal``
-shows the hand, and reads keys, where there is no screen.
+those of ``recognition.features`` or ``recognition.custom_signs`` is made there too, which its tests check. ``effects``
+says what signs do. ``terminal`` shows the hand, and reads keys, where there is no screen.
 
 The modules here teach a person's own signs, :mod:`~handsteer.plugins.teach.synthetic` trains the model of the shipped
 ones, and :mod:`~handsteer.plugins.teach.evaluation` measures how well either is recognised.

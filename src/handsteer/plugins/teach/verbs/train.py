@@ -34,7 +34,7 @@ def list_signs(*, json: Flag = False, config_file: ConfigFile = None, parameters
         YAML file with parameters, each of which is an option too: `handsteer parameters`. Options override the file.
         Without it, handsteer.yaml of the working directory, if there is one, as in `handsteer run`.
     """
-    from handsteer.control.explain import effect_of
+    from handsteer.plugins.teach.effects import effect_of
     from handsteer.recognition.recognizer import open_classifier
     from handsteer.types import NONE, action_of, find_sign
 
