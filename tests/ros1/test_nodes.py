@@ -200,6 +200,12 @@ def test_camera_info_lies_beside_the_images(ros1: Ros1Graph) -> None:
         (["camera", "_source:=gone.mp4"], "there is no camera gone.mp4"),
         (["control", "fast"], "'fast' is not a valid argument of ROS: it should be as name:=value"),
         (["control", "__ns:=9x"], "'9x', for '__ns', is not a valid name of ROS"),
+        (["control", "_joy:=null"], "'null', for '_joy', is not a valid value of ROS 1: cannot marshal None"),
+        (["control", "_actions:={1: stop}"], "'{1: stop}', for '_actions', is not a valid value of ROS 1: dictionary"),
+        (
+            ["control", "_max_linear:=99999999999"],
+            "'99999999999', for '_max_linear', is not a valid value of ROS 1: int",
+        ),
         (["control", "__name:=a/b"], "'a/b', for '__name', is not a valid name of ROS"),
         (["control", "gesture/hand_sign:=a b"], "'a b', for 'gesture/hand_sign', is not a valid name of ROS"),
         (["control", "--control.linear-step", "7"], "control.linear_step: '7' should be less than or equal to 1"),

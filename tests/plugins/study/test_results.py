@@ -131,12 +131,23 @@ def test_wherever_a_file_was_cut_off_its_whole_rows_remain(
     data = path.read_bytes()[:-cut]
     path.write_bytes(data)
     caplog.clear()
-    whole = max(0, data.count(b"\n") - 1)
+    ends = data.endswith((b"Z", b"Z\r"))  # of the last row, only the end of its line is missing
+    whole = max(0, data.count(b"\n") - 1 + ends)
     mended = Results(tmp_path)
     assert mended.done("P01", "abc") == {step(number) for number in range(whole)}
-    assert bool(caplog.records) == (not data.endswith(b"\n") and data != b"")
+    assert bool(caplog.records) == (not data.endswith(b"\n") and data != b"" and not ends)
     mended.add_lap(lap(7))
     assert [int(row["lap"]) for row in rows(path)] == [*range(whole), 7]
+
+
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"], ids=["plain", "with a byte order mark"])
+def test_a_file_that_an_editor_has_saved_without_its_last_end_of_line_goes_on(mark: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "laps.csv"
+    for number in (1, 2):
+        Results(tmp_path).add_lap(lap(number))
+    path.write_bytes(mark + path.read_bytes().replace(b"\r\n", b"\n").rstrip())
+    Results(tmp_path).add_lap(lap(3))
+    assert Results(tmp_path).done("P01", "abc") == {step(1), step(2), step(3)}
 
 
 @ANY_FOLDER

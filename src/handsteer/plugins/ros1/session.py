@@ -6,9 +6,12 @@ import re
 import sys
 import threading
 import time
+import xmlrpc.client
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
+
+import yaml
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
 from handsteer.errors import HandsteerError, TransportError, quoted
@@ -171,6 +174,18 @@ def _refuse_what_rospy_would_ignore(arguments: Sequence[str]) -> None:
             raise TransportError(
                 f"{quoted(value)}, for {quoted(name)}, is not a valid name of ROS: use letters, digits and _"
             )
+        if name.startswith("_") and not name.startswith("__"):
+            _check_parameter(name, value)
+
+
+def _check_parameter(name: str, value: str) -> None:
+    """Refuse a value that the master cannot keep, as XML-RPC has no such: null, a date, a large whole number."""
+    try:
+        xmlrpc.client.dumps((yaml.safe_load(value),))
+    except (TypeError, OverflowError) as error:
+        raise TransportError(f"{quoted(value)}, for {quoted(name)}, is not a valid value of ROS 1: {error}") from None
+    except (yaml.YAMLError, ValueError):
+        return  # rospy names it
 
 
 def _initialise(node: str, arguments: Sequence[str]) -> None:

@@ -1,14 +1,17 @@
 """The results of a study: two CSV files that are appended to, a row at a time, and outlive a crash at any moment.
 
 ``laps.csv`` has a row per lap, ``forms.csv`` a row per form. A row is on the disk before the next step begins. A
-half-written last row, of a process that was killed, is cut off when the file is opened again.
+half-written last row, of a process that was killed, is cut off when the file is opened again; to a whole one without an
+end of line, as some editors leave it, that is added.
 """
 
+import codecs
 import csv
 import errno
 import io
 import logging
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -61,6 +64,9 @@ FORM_COLUMNS: Final = (
 
 REPEATED: Final = "repeated"
 """Outcome of a lap that does not count, so that it is driven again."""
+
+_LAST_VALUE: Final = re.compile(rb",\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ\r?\Z")
+"""By this, the time in UTC, a whole row ends."""
 
 _LARGEST_BYTES: Final = 50_000_000
 
@@ -201,13 +207,17 @@ class _Table:
         return self.path.read_bytes()
 
     def _repaired(self, data: bytes) -> bytes:
-        """Return ``data`` without a half-written last row, which is cut off in the file too."""
+        """Return ``data`` with whole rows only; in the file too, the last line is ended or cut off."""
         whole = data[: data.rfind(b"\n") + 1]
         rest = data[len(whole) :]
         header = _line(self._columns)
-        is_ours = header.startswith(data) or data.startswith(header.rstrip())
+        start = data.removeprefix(codecs.BOM_UTF8)
+        is_ours = header.startswith(start) or start.startswith(header.rstrip())
         if not (rest and is_ours):
             return data
+        if _LAST_VALUE.search(rest):
+            self._append(end := b"\n" if rest.endswith(b"\r") else b"\r\n")
+            return data + end
         log.warning("%s ended in a half-written row, which was cut off: %r", self.path, rest[:1000])
         with self.path.open("r+b") as file:
             file.truncate(len(whole))
