@@ -204,7 +204,7 @@ def test_camera_info_lies_beside_the_images(ros1: Ros1Graph) -> None:
         (["control", "_actions:={1: stop}"], "'{1: stop}', for '_actions', is not a valid value of ROS 1: dictionary"),
         (
             ["control", "_max_linear:=99999999999"],
-            "'99999999999', for '_max_linear', is not a valid value of ROS 1: int",
+            "'99999999999', for '_max_linear', is not a valid value of ROS 1",
         ),
         (["control", "__name:=a/b"], "'a/b', for '__name', is not a valid name of ROS"),
         (["control", "gesture/hand_sign:=a b"], "'a b', for 'gesture/hand_sign', is not a valid name of ROS"),

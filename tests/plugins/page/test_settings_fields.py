@@ -118,9 +118,11 @@ def test_a_table_with_whatever_names_is_shown_as_a_text_that_means_it(actions: d
     assert field.parse(field.show(value)) == value
 
 
-def test_lists_and_tables_are_written_with_commas() -> None:
-    assert FIELDS["control.robots"].parse("r1, r2") == ("r1", "r2")
-    assert FIELDS["control.actions"].parse("Peace: turbo, no: stop") == {"Peace": "turbo", "no": "stop"}
+def test_lists_and_tables_are_written_with_commas_and_may_have_brackets_as_in_a_file() -> None:
+    for text in ("r1, r2", "[r1, r2]", " [r1,r2] "):
+        assert FIELDS["control.robots"].parse(text) == ("r1", "r2")
+    for text in ("Peace: turbo, no: stop", "{Peace: turbo, no: stop}"):
+        assert FIELDS["control.actions"].parse(text) == {"Peace": "turbo", "no": "stop"}
     assert message(FIELDS["control.actions"].parse, "Peace: fly").startswith("control.actions.Peace: 'fly' should be")
 
 

@@ -146,9 +146,9 @@ class Field:
         if self.kind in ("number", "switch"):
             return _number_or_switch(text, self.path)
         if self.kind == "list":
-            return self._scalars(f"[{text}]")
+            return self._scalars(f"[{_bare(text, '[]')}]")
         if self.kind == "table":
-            pairs = iter(self._scalars(f"{{{text}}}"))
+            pairs = iter(self._scalars(f"{{{_bare(text, '{}')}}}"))
             return dict(zip(pairs, pairs, strict=True))
         return self._unmasked(text, str(current or "")) if MASK in text else text
 
@@ -170,6 +170,12 @@ class Field:
         if len(parts) != len(shown) or _host(text) != _host(MASK.join(shown)):
             raise ConfigError(f"{self.path}: this is another address, so {MASK} should be its password")
         return "".join(part + password for part, password in zip(parts, [*passwords, ""], strict=True))
+
+
+def _bare(text: str, brackets: str) -> str:
+    """Return ``text`` without the ``brackets`` that it has in a file, if it has them."""
+    stripped = text.strip()
+    return stripped[1:-1] if len(stripped) > 1 and (stripped[0], stripped[-1]) == tuple(brackets) else text
 
 
 def _title(name: str) -> str:

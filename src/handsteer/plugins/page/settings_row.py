@@ -151,7 +151,7 @@ class Row:
             self._input.error = self._without_name(error) if error else None
 
     def _without_name(self, error: str) -> str:
-        return error.removeprefix(self.field.path).removeprefix(": ")
+        return error.removeprefix(self.field.path).removeprefix(": ").removeprefix(".")
 
 
 def _facts(field: Field, default: object, *, is_changed: bool) -> str:
