@@ -76,6 +76,11 @@ def test_a_damaged_bag_is_refused_in_one_line(name: str, tmp_path: Path) -> None
     assert "\n" not in str(error.value)
 
 
+def test_a_folder_that_is_no_bag_is_said(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r" is a folder without metadata\.yaml: give a recording"):
+        open_recording(tmp_path)
+
+
 def test_what_is_missing_is_said() -> None:
     with pytest.raises(RecordingError, match=r"there is no recording nowhere\.mcap"):
         open_recording(Path("nowhere.mcap"))

@@ -12,6 +12,9 @@ from handsteer.plugins.record.recorded import Recorded, Recording
 from handsteer.regular_files import open_regular
 from handsteer.transports.encoding import types
 
+_METADATA = "metadata.yaml"
+"""In the folder of each bag of ROS 2."""
+
 
 class Bag(Recording):
     """A bag: a file of ROS 1 (``.bag``), or a folder of ROS 2, or a file of one (``.db3``).
@@ -24,6 +27,8 @@ class Bag(Recording):
     """
 
     def __init__(self, path: Path) -> None:
+        if path.is_dir() and not (path / _METADATA).exists():
+            raise RecordingError(f"{path} is a folder without {_METADATA}: give a recording (.mcap) or a bag")
         super().__init__(path)
         self._is_ros1 = path.suffix == ".bag"
         if not self.began_s and self.problem is not None:
