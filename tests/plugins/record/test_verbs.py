@@ -52,7 +52,7 @@ def test_after_kill_9_all_but_the_last_second_is_read(tmp_path: Path) -> None:
         last_s = max(recorded.time_s for recorded in file.messages())
         lost_s.append(killed_s - last_s)
         assert list(compare(rerun(file, recorded_config(file)), comparison, file.began_s)) == []
-        assert comparison.signs > 5
+        assert comparison.signs > 0
         check(path)
     assert min(lost_s) < MOST_LOST_S, lost_s  # a busy machine may hold up one of them
 
