@@ -103,7 +103,7 @@ class Row:
         line = ui.input(value=value, validation=self._check, autocomplete=known).props(
             f"{_STYLE} {keyboard} {unit} {label}"
         )
-        line.on("blur", self._take).on("keydown.enter", self._take).on("keydown.escape", self._give_up)
+        line.on("blur", self.take).on("keydown.enter", self.take).on("keydown.escape", self._give_up)
         return line
 
     @property
@@ -127,8 +127,7 @@ class Row:
         return None
 
     def _take(self) -> str:
-        is_left = isinstance(self._input, ui.input) and not self._is_edited
-        if self._is_updating or is_left:
+        if self._is_updating:
             return ""
         if self._is_current:
             self._give_up()
