@@ -66,7 +66,7 @@ def test_any_header_gives_a_language_that_there_is(accept: str) -> None:
 def test_a_translation_has_the_places_of_its_key_in_the_same_order(language: str) -> None:
     for key, words in catalogue(language).items():
         assert words, key
-        assert PLACE.findall(words) == PLACE.findall(key), key
+        assert PLACE.findall(words.replace("{=}", "{}")) == PLACE.findall(key), key
         assert not re.search(r"\d", re.sub(r"[^\W\d_]+\d+", "", key)), f"{key}: numbers are written as #"
 
 

@@ -11,6 +11,20 @@ pytestmark = NEEDS_A_BROWSER
 GERMAN = {"Driving": "Fahrt", "Stopped": "Gestoppt", "Stop": "Stopp", "Reset": "Zurücksetzen"}
 
 
+TO_BE_TYPED = {
+    "'Hi' should be written as in: Hi: turbo, Bye: stop": "'Hi' sollte geschrieben werden wie: Hi: turbo, Bye: stop",
+    "'stopp' should be 'go' or 'stop': did you mean stop?": "'stopp' sollte 'go' oder 'stop' sein: meintest du stop?",
+}
+"""Values of parameters, one of which is also the name of a sign, that stay as they are."""
+
+INSERT = """words => {
+  const shown = document.createElement("output");
+  shown.className = "typed";
+  shown.textContent = words;
+  document.body.append(shown);
+}"""
+
+
 def english_left(visit: Visit) -> list[str]:
     """Return the texts that were shown without a translation."""
     left: list[str] = visit.page.evaluate("[...window.untranslated]")
@@ -54,6 +68,9 @@ def test_words_change_with_the_state_and_numbers_stay_as_they_were() -> None:
         page.locator(".banner").get_by_text(GERMAN["Reset"], exact=True).click()
         visit.wait_until(lambda: headline(visit) != GERMAN["Stopped"])
         assert english_left(visit) == []
+        for shown, german in TO_BE_TYPED.items():
+            page.evaluate(INSERT, shown)
+            page.locator("output.typed", has_text=german).wait_for()
 
 
 def test_a_browser_in_english_loads_no_catalogue() -> None:

@@ -1,7 +1,8 @@
 // Shows the page in the language of WORDS, a catalogue in languages/ that the server has chosen by the browser's
 // wish. Texts come from many places (nodes' reports, parameters, scripts), so they are replaced where they are shown:
 // in each text and in the attributes below, before the browser draws it. "#" in a key stands for a number, "{}" for
-// any other text, which is translated in turn; both keep their order. What has translate="no" stays as it is.
+// any other text, which is translated in turn, or stays as it is where the translation has "{=}", as what is to be
+// typed has to; all keep their order. What has translate="no" stays as it is.
 
 (() => {
   const NUMBER = /(?<!\S)--(?!\S)|(?<![\p{L}\d])[+-]?\d+(?:\.\d+)?/gu;
@@ -34,10 +35,13 @@
     return words.charAt(0).toLowerCase() + words.slice(1);
   }
 
-  // Puts the values into the places of "#" and "{}", one after the other.
+  // Puts the values into the places of "#", "{}" and "{=}", one after the other.
   function filled(words, values) {
     let next = 0;
-    return words.replace(/\{\}|#/g, (place) => values[next++] ?? place);
+    return words.replace(/\{=?\}|#/g, (place) => {
+      const value = values[next++] ?? place;
+      return place === "{}" ? partOf(value) ?? value : value;
+    });
   }
 
   // Of each text, its translation, or null.
@@ -58,7 +62,7 @@
     if (known !== undefined) return asCapital(filled(known, words.match(NUMBER) ?? []), words);
     for (const { words: form, pattern } of templates) {
       const found = pattern.exec(words);
-      if (found) return asCapital(filled(form, found.slice(1).map((part) => partOf(part) ?? part)), words);
+      if (found) return asCapital(filled(form, found.slice(1)), words);
     }
     return joined(words);
   }
