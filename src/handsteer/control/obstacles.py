@@ -135,8 +135,7 @@ def _within_reach(
     """Return those of ``points``, and of ``drift``, that the robot could reach, even if it is slowed."""
     highest = _highest(moving, wanted)
     way_m = highest.linear_mps * (rule.reaction_time + _braking_s(highest, rule))
-    pad_m = _PAD_M + _PAD_S * fastest_mps(highest, rule) + _NOISE_M
-    far_m = way_m + rule.margin + _CREEP_M + reach_m(rule) + pad_m
+    far_m = way_m + rule.margin + _CREEP_M + reach_m(rule) + pad_m(fastest_mps(highest, rule)) + _NOISE_M
     x, y = points[:, 0], points[:, 1]
     if drift is None or not drift.any():
         return points[x * x + y * y <= far_m * far_m], None
@@ -209,8 +208,12 @@ def _met_while_braking(
     # A robot that reverses its direction stops on the way, and has to stop again.
     times_s = steps_s(fastest + quickest_mps(drift), rule.reaction_time + _braking_s(highest, rule))
     poses = braking(moving, target, rule, rule.reaction_time, times_s)
-    pad_m = _PAD_M + _PAD_S * fastest
-    return met(poses, times_s, points, rule, pad_m=pad_m, fastest_mps=fastest, drift=drift)
+    return met(poses, times_s, points, rule, pad_m=pad_m(fastest), fastest_mps=fastest, drift=drift)
+
+
+def pad_m(fastest_mps: float) -> float:
+    """Return the distance kept on all sides of a robot whose fastest corner moves at ``fastest_mps``, in metres."""
+    return _PAD_M + _PAD_S * fastest_mps
 
 
 def steps_s(fastest_mps: float, seconds: float) -> Points:

@@ -95,6 +95,28 @@ def test_what_cannot_be_avoided_is_left_to_the_brake() -> None:
         assert limiter.limit(wanted, 0.0).linear_mps == 0.0
 
 
+@pytest.mark.parametrize("y", [-0.15, -0.05, 0.05, 0.1, 0.2])
+def test_a_wish_that_turns_is_turned_no_further_than_it_must(y: float) -> None:
+    """A wish that turns by what was chosen is clear, and changed no more; one that turns by 0.03 rad/s less is not."""
+    post, wish = at((0.8, y)), Velocity(0.5, -math.copysign(0.02, y))
+    velocity = steer(wish, post)
+    assert velocity != wish
+    assert steer(velocity, post, wish) == velocity
+    less = Velocity(velocity.linear_mps, velocity.angular_radps - math.copysign(0.03, velocity.angular_radps))
+    assert abs(steer(less, post, wish).angular_radps) > abs(less.angular_radps)
+
+
+def test_a_gap_that_the_collision_monitor_lets_a_robot_through_is_driven_through() -> None:
+    """At 0.4 m/s it is slowed for whatever is within 3.2 cm: 4 cm to either side are room enough."""
+    slow = Velocity(0.4, 0.0)
+    for room_m, goes_through in ((0.04, True), (0.025, False)):
+        side = RULE.side + room_m
+        posts = at(*((x, y * way) for x in (0.8, 0.85, 0.9) for y in (side, side + 0.1, side + 0.2) for way in (1, -1)))
+        assert (steer(slow, posts) == slow) is goes_through
+        on_the_way = [posts - (x, 0.0) for x in np.arange(0.0, 1.0, 0.05)]
+        assert all(limit(slow, seen, RULE, slow)[0] == slow for seen in on_the_way) is goes_through
+
+
 def test_the_limit_of_turns_holds() -> None:
     post = at((0.75, 0.05))
     assert abs(steered(FORWARD, around(post, FORWARD, 0.2))[0].angular_radps) <= 0.2

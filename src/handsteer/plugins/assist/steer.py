@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from handsteer.control.assist import TURNS_RADPS, Around
 from handsteer.control.footprint import braking, fastest_mps, quickest_mps, reach_m
-from handsteer.control.obstacles import Hit, met, steps_s
+from handsteer.control.obstacles import Hit, met, pad_m, steps_s
 from handsteer.types import Velocity
 
 CLEAR_S = 1.0
@@ -32,16 +32,16 @@ WIDEST_RAD = math.radians(30)
 # A robot that turns at w has its way w * t / 2 to the side after t seconds.
 _WIDEST_RADPS = 2 * WIDEST_RAD / CLEAR_S
 
-PAD_M = 0.04
-"""Distance kept on all sides: more than that at which the collision monitor brakes, which grows with speed as well."""
-
-_PAD_S = 0.03
+# Kept on all sides, more than the distance at which the collision monitor brakes.
+_MORE_M = 0.005
 # However slow it is, it looks so far ahead: a turn before a wall needs room for the corners of the robot.
 _LEAST_M = 0.6
 _LONGEST_S = 4.0
 # A way that is longer by less than this leads nowhere else.
 _LONGER_M = 0.03
 _DIRECTIONS = 8
+# Between two of them, the turn rate is found to a 16th of their distance.
+_HALVINGS = 4
 # Shares of the speed of the wish, and what each costs: a whole turn to the side costs 1.
 _SHARES = ((1.0, 0.0), (0.8, 0.7), (0.6, 1.4), (0.4, 2.1), (0.25, 2.6))
 # A side that the robot turns to already is kept.
@@ -77,12 +77,30 @@ def steered(wanted: Velocity, around: Around) -> tuple[Velocity, Hit | None]:
     for candidate in _candidates(wanted, around):
         hit = _hit(candidate, way_m, around)
         if hit is None:
-            return candidate, avoided
+            return _refined(candidate, wanted, way_m, around), avoided
         # Before a wall, nothing leads past it yet; but there is a side to which the way is longer.
         free_m = _free_m(candidate, hit, around)
         if hit.time_s >= CLEAR_S and free_m > longest_m:
             best, longest_m = candidate, free_m
     return (wanted, None) if best is None else (best, avoided)
+
+
+def _refined(clear: Velocity, wanted: Velocity, way_m: float, around: Around) -> Velocity:
+    """Return ``clear`` with a turn rate nearer to that of ``wanted``, as near as it keeps clear.
+
+    Who wants to drive straight on does not steer, as with signs: the robot gets the whole turn, as one that passes a
+    wall by millimetres comes to stand before the next one.
+    """
+    nearer = _nearest(wanted, around)
+    if not wanted.angular_radps or nearer == clear.angular_radps:
+        return clear
+    for _ in range(_HALVINGS):
+        middle = Velocity(clear.linear_mps, (clear.angular_radps + nearer) / 2)
+        if _hit(middle, way_m, around) is None:
+            clear = middle
+        else:
+            nearer = middle.angular_radps
+    return clear
 
 
 def _free_m(target: Velocity, hit: Hit, around: Around) -> float:
@@ -95,12 +113,12 @@ def _near(wanted: Velocity, way_m: float, around: Around) -> Around:
     """Return ``around`` with those points only that a path considered could come near to."""
     fastest = Velocity(max(abs(wanted.linear_mps), abs(around.moving.linear_mps)), around.max_angular_radps)
     reach, points = reach_m(around.rule), around.points
-    far_m = max(way_m, fastest.linear_mps * LOOK_S) + reach + PAD_M + _PAD_S * fastest_mps(fastest, around.rule)
+    far_m = max(way_m, fastest.linear_mps * LOOK_S) + reach + _kept_m(fastest_mps(fastest, around.rule))
     x, y = points[:, 0] * math.copysign(1.0, wanted.linear_mps), points[:, 1]
     if around.drift is None:
-        return replace(around, points=points[(x * x + y * y <= far_m * far_m) & (x >= -reach - PAD_M)])
+        return replace(around, points=points[(x * x + y * y <= far_m * far_m) & (x >= -reach - _kept_m(0.0))])
     comes_m = np.linalg.norm(around.drift, axis=1) * _LONGEST_S
-    near = (x * x + y * y <= (far_m + comes_m) ** 2) & (x >= -reach - PAD_M - comes_m)
+    near = (x * x + y * y <= (far_m + comes_m) ** 2) & (x >= -reach - _kept_m(0.0) - comes_m)
     return replace(around, points=points[near], drift=around.drift[near])
 
 
@@ -116,8 +134,12 @@ def _hit(target: Velocity, way_m: float, around: Around) -> Hit | None:
     clear_s = max(CLEAR_S, min(way_m / abs(target.linear_mps), _LONGEST_S))
     times_s = steps_s(fastest + quickest_mps(around.drift), clear_s)
     poses = braking(moving, target, rule, clear_s, times_s)
-    pad_m = PAD_M + _PAD_S * fastest
-    return met(poses, times_s, around.points, rule, pad_m=pad_m, fastest_mps=fastest, drift=around.drift)
+    return met(poses, times_s, around.points, rule, pad_m=_kept_m(fastest), fastest_mps=fastest, drift=around.drift)
+
+
+def _kept_m(fastest: float) -> float:
+    """Return the distance kept on all sides of a robot whose fastest corner moves at ``fastest`` m/s, in metres."""
+    return pad_m(fastest) + _MORE_M
 
 
 def _candidates(wanted: Velocity, around: Around) -> Iterator[Velocity]:
@@ -141,6 +163,20 @@ def _candidates(wanted: Velocity, around: Around) -> Iterator[Velocity]:
 
 def _turns(wanted: Velocity, around: Around) -> NDArray[np.float64]:
     """Return the turn rates that may be chosen, (K,): none, if what is wanted cannot be reached soon."""
+    low, high = _reach(wanted, around)
+    if low > high:
+        return np.empty(0)
+    return np.unique([*np.linspace(low, high, _DIRECTIONS), _nearest(wanted, around)])
+
+
+def _nearest(wanted: Velocity, around: Around) -> float:
+    """Return the turn rate that may be chosen and is the nearest to that of ``wanted``."""
+    low, high = _reach(wanted, around)
+    return max(low, min(wanted.angular_radps, high))
+
+
+def _reach(wanted: Velocity, around: Around) -> tuple[float, float]:
+    """Return the least and the highest turn rate that may be chosen; none may, if the least is the higher one."""
     middle, now, most = wanted.angular_radps, around.moving.angular_radps, around.max_angular_radps
     reach = REACH_S * around.rule.angular_deceleration
     low, high = max(middle - _WIDEST_RADPS, now - reach, -most), min(middle + _WIDEST_RADPS, now + reach, most)
@@ -148,6 +184,4 @@ def _turns(wanted: Velocity, around: Around) -> NDArray[np.float64]:
         low = max(low, 0.0)
     elif middle <= -TURNS_RADPS:
         high = min(high, 0.0)
-    if low > high:
-        return np.empty(0)
-    return np.unique([*np.linspace(low, high, _DIRECTIONS), max(low, min(middle, high))])
+    return low, high
