@@ -110,6 +110,8 @@ def prints(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -
         (["recogize"], r'Unknown command "recogize": did you mean recognize\? the commands'),
         (["signs", "colect"], r'Unknown command "colect": did you mean collect\?'),
         (["doctor", "--control.mode", "signs"], r"doctor takes no parameters"),
+        (["signs", "train", "--dataset", "d.npz"], r"Unknown option: --dataset; see handsteer signs train --help"),
+        (["signs", "train", "--teach.dataset", "d"], r"signs train takes no param.*; see handsteer signs train --help"),
         (["doctor", "--port", "99999"], r"port 99999 should be from 0 to 65535"),
         (["recognize", f"{'x' * 300}.jpg"], r"cannot use 'x+\.\.\.': File name too long"),
         (["signs", "evaluate", "x" * 300], r"cannot use 'x+\.\.\.': File name too long"),

@@ -6,6 +6,7 @@ verb names the modules it works with by :func:`loads`.
 
 import gc
 import importlib
+import inspect
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -174,7 +175,8 @@ def _run(words: list[str]) -> int:
     if "parameters" in unparsed:
         given.arguments["parameters"] = parameters
     elif parameters and not _is_of_cyclopts(verb):
-        return fail(f"{words[0]} takes no parameters of the configuration; see handsteer {words[0]} --help")
+        chain = " ".join(app.parse_commands(own)[0])
+        return fail(f"{chain} takes no parameters of the configuration; see handsteer {chain} --help")
     if not _is_of_cyclopts(verb):  # help and version load little
         # First: it loads the parameters of plug-ins, whose modules may import any other, which must not be half loaded.
         importlib.import_module("handsteer.config")
@@ -210,6 +212,10 @@ def _ros_words_last(arguments: list[str]) -> list[str]:
     return [*ours, *([] if "--" in ours else ["--"]), *ros] if ros else ours
 
 
+def _takes_parameters(verb: Callable[..., object] | None) -> bool:
+    return verb is not None and "parameters" in inspect.signature(verb).parameters
+
+
 def _problem(error: CycloptsError) -> str:
     chain = " ".join(("handsteer", *(error.command_chain or ())))
     if isinstance(error, UnknownCommandError) and error.app and error.unused_tokens:
@@ -223,6 +229,6 @@ def _problem(error: CycloptsError) -> str:
     wrong = _NOT_A_NUMBER.fullmatch(text)
     if wrong:
         text = f"{wrong[1]}: {wrong[2]} should be {'a' if wrong[3] == 'float' else 'a whole'} number"
-    if isinstance(error, UnknownOptionError) and "Did you mean" not in text:
+    if isinstance(error, UnknownOptionError) and "Did you mean" not in text and _takes_parameters(error.target):
         text += with_section((error.token.keyword or error.token.value).partition("=")[0])
     return f"{text}; see {chain} --help" if not text.endswith("?") else f"{text} See {chain} --help"

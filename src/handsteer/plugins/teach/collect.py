@@ -171,6 +171,7 @@ def collect_live(
 
     Raises:
         CameraLost: The camera gives no more frames.
+        EndOfStream: The camera's file has ended.
     """
     last_s: float | None = None
     while not collector.done:

@@ -74,6 +74,16 @@ def test_the_camera_asks_for_each_sign_and_says_which_was_not_shown(capsys: pyte
     assert profile.made["signs"][STOP]["why_not"].startswith("it is read as Forward: hold your palm to the camera")
 
 
+@pytest.mark.slow
+def test_of_a_file_that_ends_what_was_shown_is_used(capsys: pytest.CaptureFixture[str]) -> None:
+    prints(capsys, "run", "--headless", "--camera", "virtual", "--duration", "8", "--record", "drive.mcap", "--fast")
+    file = ["--camera", "drive.mcap", "--camera.at-end", "end"]
+    quick = ["--hands", "right", "--seconds", "2", "--countdown", "0.1"]
+    with pytest.raises(SystemExit):
+        main(["signs", "calibrate", "--out", "mine.npz", *file, *quick])
+    assert "the camera's file has ended; the signs that were shown so far are used\n" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -85,7 +95,11 @@ def test_the_camera_asks_for_each_sign_and_says_which_was_not_shown(capsys: pyte
         (["--out", "empty.npz"], "--out: empty.npz exists, and is not such a file: give another name, or move it away"),
         (["--from", "empty.npz", "--camera", "virtual"], "give either --from or --camera"),
         (["--from", "empty.npz"], "empty.npz: none of its hands shows one of Stop, Forward"),
-        (["--from", "nowhere"], "there is no folder nowhere"),
+        (
+            ["--from", "nowhere"],
+            "there is no folder nowhere: give a folder of labelled photos or a dataset",
+        ),
+        (["--from", __file__], "test_calibrate.py is a file: give a folder of labelled photos or a dataset (.npz)"),
     ],
 )
 def test_wrong_options(capsys: pytest.CaptureFixture[str], arguments: list[str], message: str) -> None:

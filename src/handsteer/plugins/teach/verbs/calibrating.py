@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.cameras import EndOfStream
 from handsteer.cameras.choose import open_camera
 from handsteer.cameras.files import read_photo
 from handsteer.cli.installation import fetch_missing
@@ -120,6 +121,9 @@ def _of_dataset(path: Path) -> Shown:
 
 def _of_photos(config: Config, folder: Path, shipped: ShippedClassifier) -> Shown:
     """Return the hands of labelled photos; each is looked at as it is and mirrored, as the other hand."""
+    if not folder.is_dir():
+        problem = f"{folder} is a file" if folder.exists() else f"there is no folder {folder}"
+        raise ProfileError(f"--from: {problem}: give a folder of labelled photos or a dataset (.npz)")
     landmarker = open_landmarker(config)
     shown: Shown = {sign: [] for sign in SIGNS}
     for photo in read_photo_labels(folder, SIGNS):
@@ -150,6 +154,8 @@ def _live(config: Config, hands: Sequence[str], timing: Timing) -> Shown:
                         shown[sign] += [view.hand(each) for each in take.hands]
     except KeyboardInterrupt:
         say("ended; the signs that were shown so far are used")
+    except EndOfStream:
+        say("the camera's file has ended; the signs that were shown so far are used")
     finally:
         camera.close()
     return shown
