@@ -31,6 +31,9 @@ def tree() -> Iterator[Path]:
 def says(*command: str, user: int | None = None) -> str:
     """Return the last line of a set-up that fails."""
     environment = {name: value for name, value in os.environ.items() if name != "VIRTUAL_ENV"}
+    # A uv that is installed already is used, and would not have to be installed.
+    folders = environment.get("PATH", os.defpath).split(os.pathsep)
+    environment["PATH"] = os.pathsep.join(each for each in folders if not (Path(each) / "uv").exists())
     done = subprocess.run(command, user=user, env=environment, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 2
     assert done.stdout == ""
