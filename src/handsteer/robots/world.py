@@ -258,6 +258,7 @@ def describe_problem(error: ValidationError, values: Any) -> str:
         "extra_forbidden": "there is no such field",
         "union_tag_not_found": f"shape is missing; use {shapes}",
         "union_tag_invalid": f"shape must be {shapes}, not {as_name(problem.get('ctx', {}).get('tag', ''))}",
+        "tuple_type": f"{quoted(given)} should be a list, such as [a, b]",
         "string_pattern_mismatch": f"{quoted(given)} should be a colour such as '#c04020'",
         "value_error": problem["msg"].removeprefix("Value error, "),
     }

@@ -40,6 +40,7 @@ def test_the_example_is_a_plan() -> None:
             {"conditions": [{"name": "a", "input": "feet"}]},
             "conditions.0.input: 'feet' should be 'hand', 'pad', 'keys'",
         ),
+        ({"forms": "tlx"}, r"forms: 'tlx' should be a list, such as \[a, b\]"),
         ({"conditions": [{"name": "=1+1"}]}, r"conditions.0.name: '=1\+1' should begin with a letter"),
         ({"conditions": [{}]}, "conditions.0.name: is missing"),
         ({"conditions": [{**SIGNS, "laps": 3}]}, "conditions.0.laps: there is no such field"),

@@ -77,7 +77,7 @@ def calibrate(
     out
         File to write it to; by default NAME in the folder of the profiles, from which --signs.profile NAME takes it.
     camera
-        auto, virtual, a webcam's index or /dev/videoN, or an address.
+        auto, virtual, a webcam's index or /dev/videoN, an address, a video file or a folder of photos.
     from_
         Labelled photos (an index.csv, or a subfolder for each sign), or a dataset (.npz) of `signs collect`, instead of
         a camera.
