@@ -1013,7 +1013,7 @@ const WORDS = {
   "{} should be a valid string": "{} sollte ein Text sein",
   "{} should be a valid dictionary": "{} sollte eine Tabelle sein",
   "{} should be a valid dictionary or instance of {}": "{} sollte eine Tabelle sein, {}",
-  "{} should be a valid tuple": "{} sollte eine Liste sein",
+  "{} should be a list, such as [a, b]": "{} sollte eine Liste sein, zum Beispiel [a, b]",
   "{} should be a valid list": "{} sollte eine Liste sein",
   "{} is not a valid path": "{} ist kein Pfad",
   "{} should be {}, {} or {}": "{} sollte {}, {} oder {} sein",
