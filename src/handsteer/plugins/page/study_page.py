@@ -9,7 +9,9 @@ from typing import Final
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from handsteer.control.explain import ReasonCode
 from handsteer.errors import HandsteerError, StudyError
+from handsteer.nodes.status import ERROR
 from handsteer.plugins.page.camera import CameraPanel
 from handsteer.plugins.page.elements import box, button, card, tag, text
 from handsteer.plugins.page.node import DashboardNode
@@ -28,6 +30,21 @@ _NONE: Final = "No study runs here: start one with handsteer study plan.yaml --p
 _WATCHED: Final = "Another viewer drives, and leads this study: ask to drive first."
 _LOST: Final = "Another viewer drives now: the lap does not count, and is to be driven again."
 _STANDS: Final = "the robot stands until a lap begins"
+_STEER: Final = "nothing steers the robot"
+_OF_THE_HAND: Final = frozenset[ReasonCode](
+    {
+        "disarmed",
+        "disengaged",
+        "renew",
+        "no_image",
+        "not_held",
+        "held",
+        "no_input",
+        "no_sign",
+        "stop_sign",
+        "not_started",
+    }
+)
 _SLOW: Final = "The robot does not answer: try again."
 # The 3D view measures itself when the window is resized, and only then.
 _RESIZED: Final = "setTimeout(() => window.dispatchEvent(new Event('resize')), 100)"
@@ -62,7 +79,7 @@ class StudyPage(Page):
         is_over = session is not None and (session.lap is None or session.lap.course is None)
         # Between laps nothing is wrong, and there is nothing to reset.
         calm = replace(state, mood="standing", headline="Standing", reason=_STANDS, stopped=False)
-        super().show(node, calm if is_over and state.stopped else state)
+        super().show(node, calm if is_over and state.stopped else self._of_the_input(state))
         if session is None:
             return
         self._follow(session, node, state)
@@ -144,10 +161,13 @@ class StudyPage(Page):
         if self._session is not None and self._session.lap and self._session.lap.viewer == self.client.id:
             self.end("repeated")
 
+    def _of_the_input(self, state: PageState) -> PageState:
+        """Return ``state`` without why the hand does not move the robot, where another input is studied."""
+        return state if self._session is None or _method(self._session) == "hand" else without_hand(state)
+
     def _show_desk(self, session: Session) -> None:
         """Show the inputs of the step's condition only, and none while questions are asked."""
-        step = session.step
-        method = session.task.plan.condition(step.condition).input if step.condition else "hand"
+        step, method = session.step, _method(session)
         classes = f"{'driving' if step.kind == 'lap' else 'asking'} by-{method}"
         # For the scripts of inputs that cannot be hidden.
         classes += "".join(f" no-{each}" for each in ("keys", "gamepad") if each != method or step.kind != "lap")
@@ -155,6 +175,22 @@ class StudyPage(Page):
             self._desk.classes(remove=self._classes, add=classes)
             self._classes = classes
             self.client.run_javascript(_RESIZED)
+
+
+def _method(session: Session) -> str:
+    """Return the input of the step's condition."""
+    condition = session.step.condition
+    return session.task.plan.condition(condition).input if condition else "hand"
+
+
+def without_hand(state: PageState) -> PageState:
+    """Return ``state`` as it is to one who steers otherwise: what the hand and its camera lack is no reason."""
+    reason = state.control.reason
+    is_of_the_hand = reason is not None and reason.code in _OF_THE_HAND and state.robot.level < ERROR
+    if not is_of_the_hand or state.viewers.waits or state.viewers.topic:
+        return state
+    headline = state.headline if state.headline == "Stopping" else "Standing"
+    return replace(state, mood="standing", headline=headline, reason=_STEER)
 
 
 class _StudyCard:

@@ -1340,6 +1340,7 @@ const WORDS = {
   "No study runs here: start one with handsteer study plan.yaml --participant P01.": "Hier läuft keine Studie: starte eine mit handsteer study plan.yaml --participant P01.",
   "Another viewer drives, and leads this study: ask to drive first.": "Jemand anderes fährt und leitet diese Studie: frage zuerst das Steuer an.",
   "Another viewer drives now: the lap does not count, and is to be driven again.": "Jetzt fährt jemand anderes: die Runde zählt nicht und wird noch einmal gefahren.",
+  "nothing steers the robot": "nichts steuert den Roboter",
   "the robot stands until a lap begins": "der Roboter steht, bis eine Runde beginnt",
   "The robot stands until a lap begins.": "Der Roboter steht, bis eine Runde beginnt.",
   "The robot does not answer: try again.": "Der Roboter antwortet nicht: versuche es noch einmal.",
