@@ -184,7 +184,7 @@ def _method(session: Session) -> str:
 
 
 def without_hand(state: PageState) -> PageState:
-    """Return ``state`` as it is to one who steers otherwise: what the hand and its camera lack is no reason."""
+    """Return ``state`` as it is to one who steers otherwise: without reasons that lie with the hand or its camera."""
     reason = state.control.reason
     is_of_the_hand = reason is not None and reason.code in _OF_THE_HAND and state.robot.level < ERROR
     if not is_of_the_hand or state.viewers.waits or state.viewers.topic:
