@@ -6,7 +6,7 @@ considered, and it is judged by how near it is to the wish.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -74,10 +74,13 @@ def steered(wanted: Velocity, around: Around) -> tuple[Velocity, Hit | None]:
     if avoided is None:
         return wanted, None
     best, longest_m = None, _free_m(wanted, avoided, around) + _LONGER_M
-    for candidate in _candidates(wanted, around):
+    candidates = _candidates(wanted, around)
+    for cost, candidate in candidates:
         hit = _hit(candidate, way_m, around)
         if hit is None:
-            return _refined(candidate, wanted, way_m, around), avoided
+            equal = [each for its_cost, each in candidates if math.isclose(its_cost, cost)]
+            clear = [each for each in equal if each == candidate or _hit(each, way_m, around) is None]
+            return _nearest_of(clear, wanted, way_m, around), avoided
         # Before a wall, nothing leads past it yet; but there is a side to which the way is longer.
         free_m = _free_m(candidate, hit, around)
         if hit.time_s >= CLEAR_S and free_m > longest_m:
@@ -85,16 +88,24 @@ def steered(wanted: Velocity, around: Around) -> tuple[Velocity, Hit | None]:
     return (wanted, None) if best is None else (best, avoided)
 
 
-def _refined(clear: Velocity, wanted: Velocity, way_m: float, around: Around) -> Velocity:
-    """Return ``clear`` with a turn rate nearer to that of ``wanted``, as near as it keeps clear.
+def _nearest_of(clear: Sequence[Velocity], wanted: Velocity, way_m: float, around: Around) -> Velocity:
+    """Return the velocity to choose where ``clear``, on one side or on both, are as near to ``wanted``.
 
     Who wants to drive straight on does not steer, as with signs: the robot gets the whole turn, as one that passes a
     wall by millimetres comes to stand before the next one.
     """
+    if not wanted.angular_radps and len(clear) == 1:
+        return clear[0]
+    least = [_refined(each, wanted, way_m, around) for each in clear]
+    offs = [abs(each.angular_radps - wanted.angular_radps) for each in least]
+    best = offs.index(min(offs))
+    return least[best] if wanted.angular_radps else clear[best]
+
+
+def _refined(clear: Velocity, wanted: Velocity, way_m: float, around: Around) -> Velocity:
+    """Return ``clear`` with a turn rate nearer to that of ``wanted``, as near as it keeps clear."""
     nearer = _nearest(wanted, around)
-    if not wanted.angular_radps or nearer == clear.angular_radps:
-        return clear
-    for _ in range(_HALVINGS):
+    for _ in range(_HALVINGS if nearer != clear.angular_radps else 0):
         middle = Velocity(clear.linear_mps, (clear.angular_radps + nearer) / 2)
         if _hit(middle, way_m, around) is None:
             clear = middle
@@ -142,8 +153,8 @@ def _kept_m(fastest: float) -> float:
     return pad_m(fastest) + _MORE_M
 
 
-def _candidates(wanted: Velocity, around: Around) -> Iterator[Velocity]:
-    """Yield the velocities that may be chosen, the nearest to ``wanted`` first."""
+def _candidates(wanted: Velocity, around: Around) -> list[tuple[float, Velocity]]:
+    """Return the velocities that may be chosen, each with how far it is from ``wanted``, the nearest first."""
     turns, moving = _turns(wanted, around), around.moving
     most = REACH_S * around.rule.deceleration
     found: list[tuple[float, Velocity]] = []
@@ -158,7 +169,7 @@ def _candidates(wanted: Velocity, around: Around) -> Iterator[Velocity]:
             off = abs(turn - wanted.angular_radps) / _WIDEST_RADPS
             other = _OTHER_SIDE if turn * moving.angular_radps < 0 else 0.0
             found.append((cost + off + other, Velocity(linear, float(turn))))
-    yield from (velocity for _, velocity in sorted(found, key=lambda each: each[0]))
+    return sorted(found, key=lambda each: each[0])
 
 
 def _turns(wanted: Velocity, around: Around) -> NDArray[np.float64]:
