@@ -54,6 +54,14 @@ def test_it_steers_to_the_side_on_which_less_is_in_the_way(y: float, side: int, 
     assert (avoided.x, avoided.y) == (way * 0.75, y)
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_wall_is_passed_where_it_ends_sooner(side: int) -> None:
+    """The first turn that is tried and clear is equally far from the wish on both sides."""
+    wall = at(*((0.8, side * y) for y in np.linspace(-1.0, 0.2, 121)))
+    velocity, _ = steered(Velocity(0.6, 0.0), around(wall, ZERO))
+    assert velocity.angular_radps * side > 0
+
+
 def test_it_keeps_the_side_to_which_the_robot_turns_already() -> None:
     post = at((0.8, 0.0))
     for turn in (0.3, -0.3):
