@@ -156,6 +156,7 @@ class ControlContract:
         driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0))
         driver.process.freeze()
         driver.show("Forward", count=60, period_s=0.033)
+        time.sleep(0.4)  # signs of the last 0.35 s are not old, and are obeyed by a machine that takes 0.1 s to go on
         driver.process.signal(signal.SIGCONT)
         driver.expect((0.01, 0.0), (0.02, 0.0), (0.03, 0.0), (0.0, 0.0))
         time.sleep(0.5)
