@@ -96,10 +96,9 @@ def _nearest_of(clear: Sequence[Velocity], wanted: Velocity, way_m: float, aroun
     """
     if not wanted.angular_radps and len(clear) == 1:
         return clear[0]
-    least = [_refined(each, wanted, way_m, around) for each in clear]
-    offs = [abs(each.angular_radps - wanted.angular_radps) for each in least]
-    best = offs.index(min(offs))
-    return least[best] if wanted.angular_radps else clear[best]
+    both = [(_refined(each, wanted, way_m, around), each) for each in clear]
+    least, whole = min(both, key=lambda each: abs(each[0].angular_radps - wanted.angular_radps))
+    return least if wanted.angular_radps else whole
 
 
 def _refined(clear: Velocity, wanted: Velocity, way_m: float, around: Around) -> Velocity:

@@ -31,19 +31,9 @@ _WATCHED: Final = "Another viewer drives, and leads this study: ask to drive fir
 _LOST: Final = "Another viewer drives now: the lap does not count, and is to be driven again."
 _STANDS: Final = "the robot stands until a lap begins"
 _STEER: Final = "nothing steers the robot"
+# Not those of the hand as a joystick, which is off where another input is studied.
 _OF_THE_HAND: Final = frozenset[ReasonCode](
-    {
-        "disarmed",
-        "disengaged",
-        "renew",
-        "no_image",
-        "not_held",
-        "held",
-        "no_input",
-        "no_sign",
-        "stop_sign",
-        "not_started",
-    }
+    ("disarmed", "disengaged", "renew", "no_image", "no_input", "no_sign", "stop_sign", "not_started")
 )
 _SLOW: Final = "The robot does not answer: try again."
 # The 3D view measures itself when the window is resized, and only then.
