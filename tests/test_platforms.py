@@ -1,6 +1,7 @@
 """handsteer on other systems: all locked packages can be installed there, and all modules imported."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-UV = Path(sys.executable).parent / "uv"
+# That of the set-up: one on PATH where there was one, else in the environment.
+PROGRAMS = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
+UV = shutil.which("uv", path=PROGRAMS) or "uv"
 SYSTEMS = ("x86_64-manylinux_2_28", "aarch64-manylinux_2_31", "macos", "x86_64-pc-windows-msvc")
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 LOCKED = [("requirements.txt", python) for python in PYTHONS] + [
@@ -47,7 +50,7 @@ for name in modules:
     importlib.import_module(name)
 print(len(modules))
 """
-ROS = ("rclpy", "rospy", "rosgraph", "genpy", "roslib", "tf2_msgs")
+ROS = ("rclpy", "rospy", "rosgraph", "rospkg", "genpy", "roslib", "tf2_msgs")
 POSIX = ("fcntl", "grp", "pwd", "resource", "termios", "tty")
 POSIX_OS = (
     "fork",
