@@ -1,7 +1,7 @@
 import time
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from handsteer.clock import RealClock, SimulatedClock, SteppedClock, WallClock, to_seconds, to_stamp
@@ -138,6 +138,7 @@ def test_of_a_clock_that_stands_all_seconds_count() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0, 5), st.floats(0, 1000)), max_size=30))
+@example([(0.0, 0.0), (0.0, 257.04896645397844), (3.3217996810259613, 0.0327), (0.0, 762.8332333345002)])
 def test_simulated_time_never_goes_back(steps: list[tuple[float, float]]) -> None:
     simulator = Simulator()
     last_s = simulator.clock.now()
