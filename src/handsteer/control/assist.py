@@ -24,6 +24,7 @@ class Around:
         rule: Size of the robot, and its decelerations.
         max_angular_radps: The highest turn rate, above 0.
         drift: Velocities of the points, (N, 2) in m/s; None if none moves.
+        now_s: The time now, in seconds of a monotonic clock.
     """
 
     points: Points
@@ -31,6 +32,7 @@ class Around:
     rule: CollisionMonitorConfig
     max_angular_radps: float
     drift: Points | None = None
+    now_s: float = 0.0
 
 
 log = logging.getLogger(__name__)

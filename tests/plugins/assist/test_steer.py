@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from handsteer.control.footprint import Points, drifted, gaps, seen_from
 from handsteer.control.obstacles import ObstacleLimiter, limit
 from handsteer.plugins.assist.steer import CLEAR_S, REACH_S, WIDEST_RAD, Steer, steered
 from handsteer.types import ZERO, Velocity
+from tests.about import about
 
 RULE = CollisionMonitorConfig()
 MAX_RADPS = 2.0
@@ -90,6 +91,45 @@ def test_it_does_not_turn_against_a_turn_that_the_person_makes(turn: float) -> N
     post = at((0.7, math.copysign(0.15, turn)))
     velocity = steer(Velocity(0.5, turn), post)
     assert velocity.angular_radps * turn >= 0
+
+
+def on_the_arc(wish: Velocity, way_m: float) -> Points:
+    """Return where the middle of a robot that drives as ``wish`` is after ``way_m``."""
+    turned = wish.angular_radps * way_m / abs(wish.linear_mps)
+    radius_m = wish.linear_mps / wish.angular_radps
+    return at((radius_m * math.sin(turned), radius_m * (1 - math.cos(turned))))
+
+
+@pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
+@pytest.mark.parametrize("way", [1, -1], ids=["forward", "backward"])
+def test_a_turn_is_followed_for_a_second_only(way: int, side: int) -> None:
+    """Who turns is about to turn less; a post that the arc would meet later is no reason to pass it elsewhere."""
+    straight, turn = Velocity(way * 0.8, 0.0), Velocity(way * 0.8, side * 0.6)
+    assert steered(straight, around(at((way * 1.25, 0.0)), straight))[1] is not None
+    assert steered(turn, around(on_the_arc(turn, 1.25), turn)) == (turn, None)
+    assert steered(turn, around(on_the_arc(turn, 1.0), turn))[1] is not None
+
+
+def test_after_an_abrupt_change_a_wish_is_left_alone_until_it_has_lasted() -> None:
+    """A key was released: what is met within 1 s is steered around 0.5 s later, what is met after that later still."""
+    near, far, wish = at((1.0, 0.05)), at((1.35, 0.05)), Velocity(0.8, 0.0)
+    steers_from_s = {}
+    for name, post in (("near", near), ("far", far)):
+        assist = Steer()
+        assist.step(Velocity(0.8, 1.0), replace(around(post, wish), now_s=-0.05))
+        times_s = [number / 20 for number in range(40)]
+        steers = [assist.step(wish, replace(around(post, wish), now_s=now_s))[1] is not None for now_s in times_s]
+        first = steers.index(True)
+        assert all(steers[first:])
+        steers_from_s[name] = times_s[first]
+    assert steers_from_s == {"near": 0.5, "far": about(0.85, abs=0.1)}
+
+
+def test_a_wish_that_changes_little_by_little_is_steered_at_once() -> None:
+    assist, post = Steer(), at((0.7, 0.1))
+    for number, turn in enumerate((0.0, 0.25, 0.5, 0.3, 0.05)):
+        wish = Velocity(0.5, turn)
+        assert assist.step(wish, replace(around(post, wish), now_s=number / 10)) == steered(wish, around(post, wish))
 
 
 def test_what_cannot_be_avoided_is_left_to_the_brake() -> None:
@@ -215,6 +255,7 @@ def test_in_random_cases_the_brake_has_the_last_word() -> None:
     for case in cases(CASES // 3, 1):
         limiter = ObstacleLimiter(RULE)
         limiter.assist, limiter.max_angular_radps = Steer(), MAX_RADPS
+        limiter.assist.step(case.wanted, replace(around(at(), ZERO), now_s=-5.0))
         limiter.see(case.points, 0.0)
         limiter.feel(case.moving, 0.0)
         allowed = limiter.limit(case.wanted, 0.0)

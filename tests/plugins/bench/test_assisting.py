@@ -75,3 +75,12 @@ def test_nobody_who_walks_is_touched_by_a_robot_that_moves() -> None:
 def test_who_has_stood_for_the_robot_is_not_touched_when_they_walk_on() -> None:
     """Signs are slow enough for that; on this lap a person sets out when the robot is beside them."""
     assert run_lap("corridor", "signs", 3, Conditions(assist="steer")).bumps == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("interface", "seed"), [("keys", 2), ("point", 0)])
+def test_steer_does_not_take_the_robot_past_a_post_on_the_other_side(interface: str, seed: int) -> None:
+    """Once no such lap ended: what a key is pressed for, or a finger tilted, is not where the person goes."""
+    lap = run_lap("slalom", interface, seed, Conditions(assist="steer"))
+    assert lap.finished
+    assert (lap.missed, lap.bumps) == (0, 0)

@@ -21,7 +21,12 @@ CLEAR_S = 1.0
 """For so long at least the path of what is chosen keeps clear, in seconds."""
 
 LOOK_S = 1.5
-"""It steers if the path of the wish meets something within this, in seconds: early enough for a bend at full speed."""
+"""It steers if the path of a wish to drive straight on meets something within this, in seconds: early enough for a bend
+at full speed. Who turns is about to turn less: a turn is followed for :data:`CLEAR_S` only.
+"""
+
+WAIT_S = 0.5
+"""For so long after an abrupt change of the wanted turn it does not steer, in seconds."""
 
 REACH_S = 0.5
 """What is chosen can be reached within this, in seconds, with the guaranteed decelerations."""
@@ -31,6 +36,9 @@ WIDEST_RAD = math.radians(30)
 
 # A robot that turns at w has its way w * t / 2 to the side after t seconds.
 _WIDEST_RADPS = 2 * WIDEST_RAD / CLEAR_S
+
+# From one command to the next: keys change the turn by more, a stick and a ramp seldom do.
+_ABRUPT_RADPS = 0.6
 
 # Kept on all sides, more than the distance at which the collision monitor brakes.
 _MORE_M = 0.005
@@ -49,26 +57,40 @@ _OTHER_SIDE = 0.2
 
 
 class Steer:
-    """The :class:`~handsteer.doors.Assist` ``steer``."""
+    """The :class:`~handsteer.doors.Assist` ``steer``: :func:`steered`, for a wish that lasts.
+
+    Keys turn and drive straight on alternately, a moment each, and neither alone says where the person goes: a wish is
+    taken to last for as long as it has been held, and half a second more.
+    """
+
+    def __init__(self) -> None:
+        self._turn_radps = 0.0
+        self._since_s = -math.inf
 
     def step(self, wanted: Velocity, around: Around) -> tuple[Velocity, Hit | None]:
-        """Return :func:`steered`."""
-        return steered(wanted, around)
+        """Return :func:`steered`, or ``wanted`` for :data:`WAIT_S` after an abrupt change."""
+        if abs(wanted.angular_radps - self._turn_radps) > _ABRUPT_RADPS:
+            self._since_s = around.now_s
+        self._turn_radps = wanted.angular_radps
+        held_s = around.now_s - self._since_s
+        return (wanted, None) if held_s < WAIT_S else steered(wanted, around, CLEAR_S - WAIT_S + held_s)
 
 
-def steered(wanted: Velocity, around: Around) -> tuple[Velocity, Hit | None]:
+def steered(wanted: Velocity, around: Around, look_s: float = LOOK_S) -> tuple[Velocity, Hit | None]:
     """Return the velocity to command instead of ``wanted``, and the obstacle that it avoids, or None.
 
-    It is ``wanted`` if its path keeps clear for :data:`LOOK_S` or 0.6 m, or if there is none around: then it is for
-    others to brake. A turn in place is left as it is.
+    It is ``wanted`` if its path keeps clear for :data:`LOOK_S`, or :data:`CLEAR_S` if it turns, and for 0.6 m, or if
+    there is none around: then it is for others to brake. A turn in place is left as it is.
 
     Args:
         wanted: What the person wants; finite.
         around: The obstacles and the robot.
+        look_s: A shorter time than :data:`LOOK_S`, in seconds.
     """
     if not wanted.linear_mps or not len(around.points):
         return wanted, None
-    way_m = max(LOOK_S * abs(wanted.linear_mps), _LEAST_M)
+    look_s = min(look_s, CLEAR_S if abs(wanted.angular_radps) >= TURNS_RADPS else LOOK_S)
+    way_m = max(look_s * abs(wanted.linear_mps), _LEAST_M)
     around = _near(wanted, way_m, around)
     avoided = _hit(wanted, way_m, around)
     if avoided is None:
