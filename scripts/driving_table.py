@@ -33,7 +33,13 @@ SWEEPS: dict[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
 FINE = ("joystick", "point", "pad")
 ASSISTS = ("off", "brake", "steer")
 DRIVEN = tuple(each for each in INTERFACES if each != "signs_per_second")
-ASSISTED = {"maze": DRIVEN, "narrow-doors": ("signs", *FINE), "corridor": ("signs", *FINE)}
+ASSISTED = {
+    "maze": DRIVEN,
+    "narrow-doors": ("signs", *FINE),
+    "corridor": ("signs", *FINE),
+    "slalom": DRIVEN,
+    "parking": DRIVEN,
+}
 LATE_S = 0.25
 
 
