@@ -55,6 +55,29 @@ def test_the_operator_backs_off_from_an_obstacle() -> None:
     assert any(operator.decide(stuck).linear_mps < 0.0 for _ in range(40))
 
 
+@pytest.mark.parametrize("delay_s", [0.0, 0.25])
+def test_the_operator_backs_off_where_an_assist_holds_the_robot(delay_s: float) -> None:
+    """For six seconds the operator only wants more; then the robot is to go back, and then on."""
+    operator = Operator(STRAIGHT, Skill(), delay_s, np.random.default_rng(0))
+    held = Seen(Pose2D(2.0, 0.0, 0.0), ZERO)
+    wanted = [operator.decide(held).linear_mps for _ in range(round(15.0 / DECISION_S))]
+    first = next(number for number, each in enumerate(wanted) if each < 0.0)
+    assert 6.0 <= first * DECISION_S <= 6.2 + 2 * delay_s
+    assert wanted[first - 1] > wanted[round(delay_s / DECISION_S)] > 0.0
+    assert max(wanted[first + round(3.0 / DECISION_S) :]) > 0.0
+
+
+def test_the_operator_does_not_back_off_while_the_robot_turns_or_is_to_stand() -> None:
+    operator = Operator(STRAIGHT, Skill(), 0.0, np.random.default_rng(0))
+    turning = [Seen(Pose2D(2.0, 0.0, yaw), Velocity(0.0, 0.5)) for yaw in np.linspace(-2.0, -1.0, 200)]
+    assert min(operator.decide(each).linear_mps for each in turning) == 0.0
+    assert STRAIGHT.stop_m is not None
+    there = Seen(Pose2D(STRAIGHT.stop_m, 0.0, 0.0), ZERO)
+    operator = Operator(STRAIGHT, Skill(), 0.0, np.random.default_rng(0))
+    operator.decide(Seen(Pose2D(STRAIGHT.stop_m - 0.5, 0.0, 0.0), ZERO))
+    assert min(operator.decide(there).linear_mps for _ in range(200)) > -0.25
+
+
 def test_the_operator_stops_at_the_line() -> None:
     operator = Operator(STRAIGHT, Skill(), 0.0, np.random.default_rng(0))
     x, speed = 0.0, 0.0

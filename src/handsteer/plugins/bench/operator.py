@@ -32,7 +32,7 @@ _CLEAR_S = 0.3
 _TURNS_RAD = 0.9
 _STUCK_S, _STUCK_M = 1.0, 0.06
 _BACK_M, _BACK_MPS = 0.35, 0.25
-_PATIENT_S = 0.7
+_PATIENT_S, _HELD_S = 0.7, 6.0
 _LOOKS_S, _BETWEEN_GAPS_S = 4.0, 10.0
 
 # Perception: errors of the seen place, heading, and speed, which change slowly (an Ornstein-Uhlenbeck process).
@@ -224,16 +224,16 @@ class Operator:
         return min(speed, fastest) if left > 0 else -min(0.2, fastest)
 
     def _is_backing_off(self, seen: Seen) -> bool:
-        """Return whether the robot is stuck at an obstacle, and has to back off first."""
+        """Return whether the robot is stuck at an obstacle, or before it by an assist, and has to back off first."""
         if self._decisions < self._back_until:
             return True
         pose, where = seen.pose, self._stuck_at
         if not seen.touches or where is None or math.hypot(pose.x - where.x, pose.y - where.y) > _STUCK_M:
             self._stuck_at, self._stuck_s = pose, 0.0
         self._stuck_s += DECISION_S
-        if self._stuck_s <= _STUCK_S + self._delay_s:
+        if self._stuck_s <= _STUCK_S + self._delay_s and self._stood_s <= _HELD_S + self._delay_s:
             return False
-        self._stuck_at = None
+        self._stuck_at, self._stood_s = None, 0.0
         self._back_until = self._decisions + round((_BACK_M / _BACK_MPS + self._delay_s) / DECISION_S)
         return True
 
