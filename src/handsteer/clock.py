@@ -217,7 +217,7 @@ class SimulatedClock:
     def stamp(self, time_s: float) -> "Time":
         """Return the simulator's time for ``time_s``, at most the latest one received."""
         with self._lock:
-            # Compared as sums: told + offset - offset may differ from told in its last digit, and so by a nanosecond.
+            # Rounding can make (latest + offset) - offset differ from the latest time, and its stamp by a nanosecond.
             is_past = time_s < self._told_s + self._offset_s
             return to_stamp(max(0.0, time_s - self._offset_s if is_past else self._told_s))
 
