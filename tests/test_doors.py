@@ -171,7 +171,7 @@ def test_an_assist_is_chosen_by_its_name(installed: Installed) -> None:
     calm, rule = assist_named("calm"), Config().collision_monitor
     assert calm is not None
     for x, linear_mps in ((0.9, 0.2), (1.1, 0.4)):
-        velocity, _ = assisted(calm, Velocity(0.4, 0.1), Around(np.array([(x, 0.0)]), Velocity(), rule, 2.0))
+        velocity, _ = assisted(calm, Velocity(0.4, 0.1), Around(np.array([(x, 0.0)]), Velocity(), rule, 2.0, 0.0))
         assert velocity == Velocity(linear_mps, 0.1)
 
 

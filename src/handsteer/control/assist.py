@@ -23,16 +23,16 @@ class Around:
         moving: The robot's velocity.
         rule: Size of the robot, and its decelerations.
         max_angular_radps: The highest turn rate, above 0.
-        drift: Velocities of the points, (N, 2) in m/s; None if none moves.
         now_s: The time now, in seconds of a monotonic clock.
+        drift: Velocities of the points, (N, 2) in m/s; None if none moves.
     """
 
     points: Points
     moving: Velocity
     rule: CollisionMonitorConfig
     max_angular_radps: float
+    now_s: float
     drift: Points | None = None
-    now_s: float = 0.0
 
 
 log = logging.getLogger(__name__)

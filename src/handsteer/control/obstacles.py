@@ -374,7 +374,7 @@ class ObstacleLimiter:
         if self._points is not None and not self.is_blind(now_s):
             points, drift = self._points_at(now_s, self._points)
             if self.assist is not None:
-                around = Around(points, self._moving, self.rule, self.max_angular_radps, drift, now_s)
+                around = Around(points, self._moving, self.rule, self.max_angular_radps, now_s, drift)
                 wanted, self.avoided = assisted(self.assist, wanted, around)
             velocity, self.hit = limit(wanted, points, self.rule, self._moving, drift)
         self._commanded, self._commanded_s = velocity, now_s

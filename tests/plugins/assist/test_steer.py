@@ -23,7 +23,7 @@ FORWARD = Velocity(0.5, 0.0)
 
 
 def around(points: Points, moving: Velocity, max_radps: float = MAX_RADPS, *, drift: Points | None = None) -> Around:
-    return Around(points, moving, RULE, max_radps, drift)
+    return Around(points, moving, RULE, max_radps, 0.0, drift)
 
 
 def at(*points: tuple[float, float]) -> Points:
@@ -123,6 +123,19 @@ def test_after_an_abrupt_change_a_wish_is_left_alone_until_it_has_lasted() -> No
         assert all(steers[first:])
         steers_from_s[name] = times_s[first]
     assert steers_from_s == {"near": 0.5, "far": about(0.85, abs=0.1)}
+
+
+def test_the_control_s_time_passes_for_it() -> None:
+    """The same through the limiter, which gives the assist its time."""
+    limiter, post, wish = ObstacleLimiter(RULE), at((0.75, 0.1)), Velocity(0.5, 0.0)
+    limiter.assist, limiter.max_angular_radps = Steer(), MAX_RADPS
+    is_avoided = []
+    for now_s, wanted in ((10.0, Velocity(0.5, 1.0)), (10.1, wish), (10.5, wish), (10.7, wish)):
+        limiter.see(post, now_s)
+        limiter.feel(wish, now_s)
+        limiter.limit(wanted, now_s)
+        is_avoided.append(limiter.avoided is not None)
+    assert is_avoided == [False, False, False, True]
 
 
 def test_a_wish_that_changes_little_by_little_is_steered_at_once() -> None:
