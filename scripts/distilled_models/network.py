@@ -1,4 +1,4 @@
-"""MediaPipe's palm model as a network of PyTorch, and back: its weights can be trained."""
+"""MediaPipe's models of palms and of hand landmarks as networks of PyTorch, and back, so that they can be trained."""
 
 from typing import Any, Final
 
@@ -13,11 +13,11 @@ _KINDS: Final = {number: kind for kind, number in vars(schema.BuiltinOperator).i
 _TYPES: Final = {schema.TensorType.FLOAT32: "<f4", schema.TensorType.FLOAT16: "<f2", schema.TensorType.INT32: "<i4"}
 _ACTIVATIONS: Final = {0: lambda value: value, 1: functional.relu, 3: functional.relu6}
 # From the axes of a file's weights to those of PyTorch's, by kind of operation, and back.
-_AXES: Final = {"CONV_2D": (0, 3, 1, 2), "DEPTHWISE_CONV_2D": (3, 0, 1, 2)}
+_AXES: Final = {"CONV_2D": (0, 3, 1, 2), "DEPTHWISE_CONV_2D": (3, 0, 1, 2), "FULLY_CONNECTED": (0, 1)}
 
 
-class PalmNetwork(nn.Module):  # type: ignore[misc]
-    """The network of ``palm_detection_full.tflite``, which gives the same values up to rounding.
+class Network(nn.Module):  # type: ignore[misc]
+    """The network of a model file, which gives the same values up to rounding, but the logits of probabilities.
 
     Args:
         content: The model file.
@@ -44,18 +44,19 @@ class PalmNetwork(nn.Module):  # type: ignore[misc]
                 self._trained[name] = (self._halves.get(tensor, tensor), axes)
             self._steps.append((number, kind, operation))
 
-    def forward(self, picture: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the values (n, 2016, 18) and logits (n, 2016) of (n, 3, 192, 192) RGB pictures, 0 to 1."""
+    def forward(self, picture: torch.Tensor) -> list[torch.Tensor]:
+        """Return the outputs for (n, 3, side, side) RGB pictures, 0 to 1, in the order of the file."""
         values = {self._graph.inputs[0]: picture}
         for number, kind, operation in self._steps:
             values[operation.outputs[0]] = self._run(number, kind, operation, values)
-        boxes, logits = (values[output] for output in self._graph.outputs)
-        return boxes, logits[..., 0]
+        return [values[output] for output in self._graph.outputs]
 
     def _run(self, number: int, kind: str, operation: Any, values: dict[int, torch.Tensor]) -> torch.Tensor:
         options, picture = operation.builtinOptions, values[operation.inputs[0]]
         if kind in _AXES:
             weights, bias = self.weights[f"{number:03d}_0"], self.weights[f"{number:03d}_1"]
+            if kind == "FULLY_CONNECTED":
+                return functional.linear(picture, weights, bias)
             groups = len(weights) if kind == "DEPTHWISE_CONV_2D" else 1
             if options.padding == schema.Padding.SAME:
                 picture = functional.pad(picture, _same(picture, weights, options.strideH))
@@ -71,6 +72,10 @@ class PalmNetwork(nn.Module):  # type: ignore[misc]
 
     def _reshaped(self, kind: str, operation: Any, picture: torch.Tensor) -> torch.Tensor:
         options = operation.builtinOptions
+        if kind == "LOGISTIC":
+            return picture
+        if kind == "MEAN":
+            return picture.mean((2, 3))
         if kind == "MAX_POOL_2D":
             return functional.max_pool2d(picture, options.filterHeight, options.strideH)
         if kind == "PAD":

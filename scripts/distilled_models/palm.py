@@ -7,7 +7,7 @@ Run it with the photos that the tables of docs/signs.md call tuning, in handstee
 which nothing else needs::
 
     cd ../shared/data
-    python .../scripts/palm_model/train.py hagrid-dev photos --videos videos/[Cd]*.mp4
+    python .../scripts/distilled_models/palm.py hagrid-dev photos --videos videos/[Cd]*.mp4
 
 Training takes 25 minutes on two cores, and does not give the same file byte for byte: PyTorch's sums differ between
 processors, and the number of steps with time. ``make bench-signs`` says whether another one is better. The shipped file
@@ -15,18 +15,16 @@ is of the first form of this program, which gave a third of the grey pictures a 
 """
 
 import argparse
-import copy
 import hashlib
-import math
-import time
 from pathlib import Path
 from typing import Final
 
 import cv2
 import numpy as np
 import torch
-from network import PalmNetwork
-from pictures import SIDE, Picture, Pictures
+from distill import distilled, tensor
+from network import Network
+from palm_pictures import SIDE, Pictures
 from torch.nn import functional
 
 from handsteer.recognition.landmark_models import find_model
@@ -37,9 +35,6 @@ _GRIDS: Final = ((8, 2), (16, 6))
 """Side of each grid's cells in pixels, and number of anchors in a cell, as in ``regions``."""
 _BATCH: Final = 16
 _SPOILT: Final = 0.8
-_RATE: Final = 3e-4
-"""Largest step, relative to the root mean square of the weights of a layer; with 2e-3, the loss grows."""
-_WARM_UP: Final = 60
 _SURE: Final = 0.3
 """Score from which the teacher's box and keypoints count."""
 
@@ -54,41 +49,16 @@ def main() -> None:
     cv2.setNumThreads(1)
     torch.manual_seed(0)
     pictures = Pictures(options.folders, options.videos, seed=11)
-    model = trained(find_model("palm_detection_full.tflite").read_bytes(), pictures, options.minutes)
+    model = distilled(
+        find_model("palm_detection_full.tflite").read_bytes(),
+        lambda teacher, learner: _loss(teacher, learner, pictures),
+        options.minutes,
+    )
     options.target.write_bytes(model)
     print(f"{options.target}: {len(model)} bytes, SHA-256 {hashlib.sha256(model).hexdigest()}")
 
 
-def trained(content: bytes, pictures: Pictures, minutes: float) -> bytes:
-    """Return the model file ``content`` after training its weights on ``pictures`` for so long."""
-    teacher, learner = PalmNetwork(content).eval().requires_grad_(False), PalmNetwork(content)
-    mean = copy.deepcopy(learner).requires_grad_(False)
-    layers = [
-        {"params": [each], "size": max(1e-4, float(each.detach().square().mean().sqrt()))}
-        for each in learner.parameters()
-    ]
-    optimiser = torch.optim.Adam(layers, lr=_RATE, betas=(0.9, 0.99))
-    began, step, losses = time.monotonic(), 0, []
-    while (done := (time.monotonic() - began) / (60 * minutes)) < 1:
-        rate = _RATE * min(1, step / _WARM_UP) * max(0.02, 0.5 * (1 + math.cos(math.pi * done)))
-        for layer in optimiser.param_groups:
-            layer["lr"] = rate * layer["size"]
-        loss = _loss(teacher, learner, pictures)
-        optimiser.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(learner.parameters(), 10.0)
-        optimiser.step()
-        step += 1
-        with torch.no_grad():
-            for averaged, each in zip(mean.parameters(), learner.parameters(), strict=True):
-                averaged.lerp_(each, max(0.005, 1 / (step + 9)))
-        losses.append(float(loss.detach()))
-        if step % 25 == 0:
-            print(f"step {step}, {done:.0%}: loss {np.mean(losses[-25:]):.3f}", flush=True)
-    return bytes(mean.file())
-
-
-def _loss(teacher: PalmNetwork, learner: PalmNetwork, pictures: Pictures) -> torch.Tensor:
+def _loss(teacher: Network, learner: Network, pictures: Pictures) -> torch.Tensor:
     clean = [pictures.clean() for _ in range(_BATCH)]
     spoilt = [pictures.spoilt(each) if pictures.chance(_SPOILT) else each for each in clean]
     cut = [pictures.cut_off(each) for each in spoilt]
@@ -96,9 +66,9 @@ def _loss(teacher: PalmNetwork, learner: PalmNetwork, pictures: Pictures) -> tor
     x, y = np.floor(_anchors()).astype(int).T
     counted = torch.tensor(np.stack([seen[y, x] for _, seen in cut]), dtype=torch.float32)
     with torch.no_grad():
-        boxes, logits = _seen_both_ways(teacher, _tensor(clean))
+        boxes, logits = _seen_both_ways(teacher, tensor(clean))
         wanted = torch.sigmoid(logits)
-    given_boxes, given = learner(_tensor([each for each, _ in cut]))
+    given_boxes, given = _run(learner, tensor([each for each, _ in cut]))
     given = given.clamp(-80, 80)
     errors = functional.binary_cross_entropy_with_logits(given, wanted, reduction="none")
     focus = 0.75 * (torch.sigmoid(given) - wanted).abs().detach() + 0.25 * wanted
@@ -110,11 +80,17 @@ def _loss(teacher: PalmNetwork, learner: PalmNetwork, pictures: Pictures) -> tor
     return loss
 
 
-def _seen_both_ways(teacher: PalmNetwork, picture: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+def _run(network: Network, picture: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Return the values (n, 2016, 18) and logits (n, 2016) for n pictures."""
+    boxes, logits = network(picture)
+    return boxes, logits[..., 0]
+
+
+def _seen_both_ways(teacher: Network, picture: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     """Return the surer of each anchor's outputs for ``picture`` and for its mirror image."""
-    boxes, logits = teacher(picture)
+    boxes, logits = _run(teacher, picture)
     mirrored, order = _mirrored_anchors()
-    other_boxes, other = teacher(picture.flip(3))
+    other_boxes, other = _run(teacher, picture.flip(3))
     other_boxes, other = other_boxes[:, order] * mirrored, other[:, order]
     surer = other > logits
     return torch.where(surer[..., None], other_boxes, boxes), torch.maximum(logits, other).clamp(-80, 80)
@@ -140,11 +116,6 @@ def _anchors() -> np.ndarray:
         x, y = np.meshgrid(along, along)
         anchors.append(np.repeat(np.stack([x.ravel(), y.ravel()], axis=1), per_cell, axis=0))
     return np.concatenate(anchors)
-
-
-def _tensor(pictures: list[Picture]) -> torch.Tensor:
-    rgb = np.stack(pictures)[..., ::-1] / np.float32(255)
-    return torch.tensor(rgb.copy()).permute(0, 3, 1, 2).contiguous(memory_format=torch.channels_last)
 
 
 if __name__ == "__main__":
