@@ -13,7 +13,7 @@ import numpy as np
 from ai_edge_litert.interpreter import Interpreter
 
 from handsteer.config import LandmarksConfig
-from handsteer.recognition.landmark_models import find_pair
+from handsteer.recognition.landmark_models import find_hand_models
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 
 CLIP = Path(__file__).parents[2] / "shared" / "data" / "videos" / "dex-retargeting_human_hand_video_1280x720.mp4"
@@ -44,7 +44,7 @@ def read_jpegs(clip: Path, count: int) -> list[np.ndarray]:
 def measure(files: list[np.ndarray], model: str) -> np.ndarray:
     """Return the (n, 4) seconds of each part, for the n frames with a tracked hand."""
     landmarker = MediaPipeLandmarker(LandmarksConfig(model=model))
-    palm, landmark = (load(path) for path in find_pair(model))
+    palm, landmark = (load(path) for path in find_hand_models(model)[:2])
     following = False
     rows = []
     for file in files:

@@ -1,7 +1,9 @@
 """Builds the shipped ``hand_landmark_fast.tflite`` from MediaPipe's full model: ``make landmark-model``.
 
 Most of its operations use 8-bit integers. The result depends only on the model and ``ranges.json`` (see ``ranges.py``),
-and is reproducible with the same package versions. Needs ai-edge-quantizer, which handsteer itself does not.
+and is reproducible with the same package versions. With ``--grey``, ``hand_landmark_grey.tflite`` is built in the same
+way from the model that ``scripts/distilled_models/grey_landmark.py`` trains, and ``ranges_grey.json``. Needs
+ai-edge-quantizer, which handsteer itself does not.
 """
 
 import argparse
@@ -17,8 +19,7 @@ from ai_edge_quantizer.qtyping import TFLOperationName
 from folded import folded, operations
 
 HERE: Final = Path(__file__).parent
-RANGES: Final = HERE / "ranges.json"
-TARGET: Final = HERE.parents[1] / "src" / "handsteer" / "recognition" / "hand_landmark_fast.tflite"
+SHIPPED: Final = HERE.parents[1] / "src" / "handsteer" / "recognition"
 
 WHOLLY_INTEGER: Final = range(5, 42)
 """Operations on 8-bit integers, scaled by the measured ranges, from the first layer of 56x56 to the last of 14x14."""
@@ -32,13 +33,15 @@ In integers, the sums between these late layers would cost 0.5 to 0.8 mm of worl
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Make the 8-bit hand landmark model.")
-    parser.add_argument("source", type=Path, help="MediaPipe's hand_landmark_full.tflite")
-    parser.add_argument("--target", type=Path, default=TARGET)
+    parser.add_argument("source", type=Path, help="MediaPipe's hand_landmark_full.tflite, or the grey model")
+    parser.add_argument("--grey", action="store_true", help="build the model for pictures without colours")
     options = parser.parse_args()
+    name = "grey" if options.grey else "fast"
+    ranges, target = HERE / f"ranges{'_grey' * options.grey}.json", SHIPPED / f"hand_landmark_{name}.tflite"
     logging.getLogger().setLevel(logging.ERROR)
-    model = quantized(folded(options.source.read_bytes()), json.loads(RANGES.read_text(encoding="utf-8")))
-    options.target.write_bytes(model)
-    print(f"{options.target}: {len(model)} bytes, SHA-256 {hashlib.sha256(model).hexdigest()}")
+    model = quantized(folded(options.source.read_bytes()), json.loads(ranges.read_text(encoding="utf-8")))
+    target.write_bytes(model)
+    print(f"{target}: {len(model)} bytes, SHA-256 {hashlib.sha256(model).hexdigest()}")
 
 
 def quantized(model: bytes, ranges: dict[str, list[float]]) -> bytes:

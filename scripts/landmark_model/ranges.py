@@ -1,13 +1,15 @@
 """Measures the output ranges of the hand landmark model's operations on pictures of hands, into ``ranges.json``.
 
 Run ``python scripts/landmark_model/ranges.py FOLDER...`` in the environment of handsteer, with folders of photos as
-for ``crops.photos``. Only the ranges are stored; they identify no person.
+for ``crops.photos``; with ``--grey MODEL``, those of what ``scripts/distilled_models/grey_landmark.py`` trains, on
+pictures without colours, into ``ranges_grey.json``. Only the ranges are stored; they identify no person.
 """
 
 import argparse
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 from ai_edge_litert.interpreter import Interpreter
 from crops import crops
@@ -15,7 +17,7 @@ from folded import folded, operations
 
 from handsteer.recognition.landmark_models import find_model
 
-TARGET = Path(__file__).with_name("ranges.json")
+HERE = Path(__file__).parent
 OPERATIONS = range(4, 42)
 """The operations that ``build.py`` quantises, and the one that provides their input."""
 KEPT_PERCENT = 99.9
@@ -28,25 +30,31 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Measure the ranges for the 8-bit hand landmark model.")
     parser.add_argument("folders", type=Path, nargs="+", help="photos of people, with an index.csv")
     parser.add_argument("--crops", type=int, default=600, help="number of pictures of hands")
+    parser.add_argument("--grey", type=Path, metavar="MODEL", help="the model for pictures without colours")
     options = parser.parse_args()
     pictures = list(crops(options.folders, "choose"))
+    source, target = find_model("hand_landmark_full.tflite"), HERE / "ranges.json"
+    if options.grey:
+        pictures = [cv2.cvtColor(cv2.cvtColor(each, cv2.COLOR_RGB2GRAY), cv2.COLOR_GRAY2RGB) for each in pictures]
+        source, target = options.grey, HERE / "ranges_grey.json"
     if not pictures:
         raise SystemExit("no hand is found in these photos")
     chosen = np.random.default_rng(0).permutation(len(pictures))[: options.crops]
-    ranges = measured([pictures[i] for i in sorted(chosen)])
+    ranges = measured(source.read_bytes(), [pictures[i] for i in sorted(chosen)])
     lines = ",\n".join(f'"{name}": [{low:.4f}, {high:.4f}]' for name, (low, high) in ranges.items())
-    TARGET.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
-    json.loads(TARGET.read_text(encoding="utf-8"))
-    print(f"{TARGET}: {len(ranges)} ranges from {len(chosen)} of {len(pictures)} hands")
+    target.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
+    json.loads(target.read_text(encoding="utf-8"))
+    print(f"{target}: {len(ranges)} ranges from {len(chosen)} of {len(pictures)} hands")
 
 
-def measured(pictures: list[np.ndarray]) -> dict[str, tuple[float, float]]:
+def measured(content: bytes, pictures: list[np.ndarray]) -> dict[str, tuple[float, float]]:
     """Return the range of nearly all outputs of each operation, by the operation's name.
 
     Args:
+        content: The model file.
         pictures: (224, 224, 3) uint8 RGB each.
     """
-    model = folded(find_model("hand_landmark_full.tflite").read_bytes())
+    model = folded(content)
     interpreter = Interpreter(model_content=model, experimental_preserve_all_tensors=True)
     interpreter.allocate_tensors()
     outputs = {name: index for _, name, index in operations(model)[OPERATIONS.start : OPERATIONS.stop]}

@@ -10,7 +10,7 @@ from handsteer.config import LandmarksConfig
 from handsteer.errors import ModelCorrupt, ModelMissing
 from handsteer.plugins.teach.evaluation.views import View
 from handsteer.recognition.hand import Hand
-from handsteer.recognition.landmark_models import SHIPPED, find_model
+from handsteer.recognition.landmark_models import SHIPPED, HandModels, find_model
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from tests.recognition.drawn_hand import draw, open_left_hand, open_right_hand
 from tests.recognition.golden_frames import DATA, photo_paths, read_photo, read_video
@@ -24,11 +24,12 @@ HAND_PX = 112
 def landmarkers() -> list[MediaPipeLandmarker]:
     """Return one with each landmark model, both with the same palm model."""
 
-    def pair(model: str) -> tuple[Path, Path]:
-        return find_model("palm_detection_full.tflite"), find_model(f"hand_landmark_{model}.tflite")
+    def models(model: str) -> HandModels:
+        landmark = find_model(f"hand_landmark_{model}.tflite")
+        return HandModels(find_model("palm_detection_full.tflite"), landmark, None)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("handsteer.recognition.landmarker.find_pair", pair)
+        patch.setattr("handsteer.recognition.landmarker.find_hand_models", models)
         return [MediaPipeLandmarker(LandmarksConfig(model=model)) for model in ("full", "fast")]
 
 

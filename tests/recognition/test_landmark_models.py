@@ -8,10 +8,18 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from handsteer.errors import ModelCorrupt, ModelError, ModelMissing
-from handsteer.recognition.landmark_models import MODELS, fetch_models, find_model, models_dir
+from handsteer.recognition.landmark_models import (
+    MODELS,
+    fetch_models,
+    find_model,
+    is_grey,
+    models_dir,
+)
 
 HERE = models_dir()
 """Where the models really are, before a test says otherwise."""
@@ -187,3 +195,32 @@ def test_a_folder_that_cannot_be_made_is_named(monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setenv("HANDSTEER_MODELS", str(tmp_path / "file" / "models"))
     with pytest.raises(ModelError, match=r"cannot store the landmark models in .*file"):
         fetch_models(no_progress)
+
+
+def grey_picture() -> np.ndarray:
+    levels = np.random.default_rng(0).integers(0, 256, (48, 64), np.uint8)
+    return np.asarray(cv2.cvtColor(cv2.resize(levels, (640, 480)), cv2.COLOR_GRAY2BGR), np.uint8)
+
+
+def test_a_picture_without_colours_is_grey() -> None:
+    assert is_grey(grey_picture())
+    assert is_grey(grey_picture()[:1, :1])
+
+
+def test_a_grey_video_stays_grey_after_compression(tmp_path: Path) -> None:
+    path = str(tmp_path / "grey.avi")
+    writer = cv2.VideoWriter(path, cv2.VideoWriter.fourcc(*"MJPG"), 30, (640, 480))
+    writer.write(grey_picture())
+    writer.release()
+    is_read, image = cv2.VideoCapture(path).read()
+    assert is_read
+    assert np.ptp(image, axis=2).any()
+    assert is_grey(np.asarray(image, np.uint8))
+
+
+@pytest.mark.parametrize("channel", [0, 1, 2])
+@pytest.mark.parametrize("corner", [(0, 0), (3, 101), (463, 623)])
+def test_a_picture_in_which_one_hand_has_a_colour_is_not_grey(channel: int, corner: tuple[int, int]) -> None:
+    picture, (y, x) = grey_picture() // 2, corner
+    picture[y : y + 17, x : x + 17, channel] += 15
+    assert not is_grey(picture)

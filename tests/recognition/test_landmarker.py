@@ -311,6 +311,49 @@ def test_no_hand_is_seen_again_after_the_first_frame_of_a_stream(
         assert len(runs) == (0 if number else 4)
 
 
+def grey(image: np.ndarray) -> np.ndarray:
+    return np.asarray(cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR), np.uint8)
+
+
+def test_a_hand_in_a_picture_without_colours_is_seen_by_a_second_model(
+    landmarker: MediaPipeLandmarker, runs: list[int]
+) -> None:
+    points = open_right_hand(320, 250)
+    for frame, is_seen in ((grey(draw(points)), True), (draw(points), False)):
+        landmarker.reset()
+        for number in range(3):
+            (hand,) = landmarker.detect(frame, dt_s=DT)
+            for mirrored in (False, True) if number == 0 else (False,):
+                runs.clear()
+                seen = landmarker.look_in_grey(frame, hand, mirrored=mirrored)
+                assert (seen is not hand, len(runs)) == (is_seen, is_seen)
+                assert distance(seen, points) < 20
+        landmarker.follow_only(hand)
+        assert len(landmarker.detect(frame, dt_s=DT)) == 1
+
+
+def test_a_second_model_that_is_not_sure_of_a_hand_changes_nothing(landmarker: MediaPipeLandmarker) -> None:
+    frame = grey(draw(open_right_hand(320, 250)))
+    (hand,) = landmarker.detect(frame, dt_s=DT)
+    assert landmarker.look_in_grey(np.full_like(frame, 90), hand) is hand
+
+
+def test_looks_in_grey_are_runs_of_the_model_in_a_frame(landmarker: MediaPipeLandmarker, runs: list[int]) -> None:
+    frame = grey(draw(open_right_hand(320, 250)))
+    for _ in range(3):
+        (hand,) = landmarker.detect(frame, dt_s=DT)
+    runs.clear()
+    assert landmarker.look_in_grey(frame, hand) is not hand
+    assert [landmarker.look_in_grey(frame, hand) for _ in range(6)][-1] is hand
+    assert len(runs) <= 5
+
+
+def test_mediapipe_s_own_models_have_no_second_one_for_grey_pictures() -> None:
+    landmarker, frame = MediaPipeLandmarker(LandmarksConfig(model="full")), grey(draw(open_right_hand(320, 250)))
+    (hand,) = landmarker.detect(frame)
+    assert landmarker.look_in_grey(frame, hand) is hand
+
+
 def test_a_region_that_is_seen_mirrored_shows_the_same_hand() -> None:
     model = PictureModel(find_model("hand_landmark_fast.tflite"), 1)
     points = open_left_hand(300, 250)

@@ -6,7 +6,7 @@ from handsteer.errors import FrameError
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import Recognizer
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
-from handsteer.types import FORWARD, GO, NONE, SIGNS, STOP
+from handsteer.types import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP
 from tests.recognition.hands import RecordedLandmarker, moved, show_fingers, show_sign
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
@@ -117,6 +117,23 @@ class Unsure(RecordedLandmarker):
         return self.better
 
 
+class UnsureInGrey(Unsure):
+    """Sees other hands in grey, and notes at which hands it looked, and which it goes on to follow."""
+
+    def __init__(self, frames: list[list[Hand]], grey: Hand = HAND, mirrored: Hand = HAND) -> None:
+        super().__init__(frames, frames[0][0])
+        self.in_grey = {False: grey, True: mirrored}
+        self.asked_in_grey: list[Hand] = []
+        self.followed: list[Hand] = []
+
+    def look_in_grey(self, image: np.ndarray, hand: Hand, *, mirrored: bool = False) -> Hand:
+        self.asked_in_grey.append(hand)
+        return self.in_grey[mirrored]
+
+    def follow_only(self, hand: Hand) -> None:
+        self.followed.append(hand)
+
+
 def test_a_hand_without_a_sign_is_seen_again() -> None:
     peace = show_fingers("index", "middle")
     landmarker = Unsure([[peace]], HAND)
@@ -125,12 +142,48 @@ def test_a_hand_without_a_sign_is_seen_again() -> None:
     assert len(landmarker.asked) == 1
 
 
+def test_a_hand_without_a_sign_is_seen_in_grey_after_that() -> None:
+    peace, better = show_fingers("index", "middle"), moved(show_fingers("index", "middle"), x_px=5.0)
+    landmarker = UnsureInGrey([[peace]])
+    landmarker.better = better
+    recognition = Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE)
+    assert (recognition.sign, recognition.hand) == (FORWARD, HAND)
+    assert landmarker.asked_in_grey == [better]
+
+
+@pytest.mark.parametrize("shown", [show_fingers("index", "middle"), show_sign(GO)])
+@pytest.mark.parametrize("in_grey", [show_fingers("index", "middle"), show_sign(STOP), show_sign(GO)])
+def test_a_hand_that_does_not_point_in_grey_stays_as_it_was_seen(shown: Hand, in_grey: Hand) -> None:
+    landmarker = UnsureInGrey([[shown]], moved(in_grey, x_px=5.0), moved(in_grey, x_px=5.0))
+    recognition = Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE)
+    assert (recognition.sign, recognition.hand) == (CLASSIFIER.classify(shown).sign, shown)
+
+
+@pytest.mark.parametrize(
+    ("grey", "mirrored", "sign"),
+    [(HAND, HAND, FORWARD), (HAND, show_sign(GO), GO), (HAND, show_sign(BACKWARD), GO), (show_sign(GO), HAND, GO)],
+)
+def test_a_fist_is_another_sign_if_it_is_so_mirrored_too(grey: Hand, mirrored: Hand, sign: str) -> None:
+    landmarker = UnsureInGrey([[show_sign(GO)]], grey, mirrored)
+    assert Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE).sign == sign
+
+
+def test_a_hand_that_is_seen_in_grey_is_followed_as_it_was_found() -> None:
+    found = show_fingers("index", "middle")
+    landmarker = UnsureInGrey([[found]] * 10)
+    stream = Recognizer(landmarker=landmarker, classifier=CLASSIFIER)
+    assert [stream.step(IMAGE, 0.04).sign for _ in range(10)][-1] == FORWARD
+    assert landmarker.followed
+    assert all(hand is found for hand in landmarker.followed)
+
+
 def test_no_hand_is_seen_again_while_any_shows_a_sign() -> None:
     peace = moved(show_fingers("index", "middle"), x_px=200)
     for hands, sign in (([show_sign(STOP)], STOP), ([peace, show_sign(STOP)], STOP), ([HAND], FORWARD)):
-        landmarker = Unsure([hands], HAND)
+        landmarker = UnsureInGrey([hands])
         assert Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE).sign == sign
         assert not landmarker.asked
+        assert not landmarker.asked_in_grey
 
 
 def test_a_sign_that_counts_goes_on_while_the_hand_moves() -> None:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from handsteer.recognition.landmark_models import find_pair
+from handsteer.recognition.landmark_models import find_hand_models
 from handsteer.recognition.regions import Detector, PalmDetector, Roi, from_landmarks, from_palm, whole_frame
 from tests.about import about
 from tests.recognition.drawn_hand import draw, open_right_hand
@@ -95,13 +95,13 @@ def test_a_whole_frame_is_letterboxed(border: int, outside: int) -> None:
 
 @pytest.fixture(scope="module")
 def palms() -> PalmDetector:
-    return PalmDetector(find_pair("fast")[0], 1, 0.3)
+    return PalmDetector(find_hand_models("fast").palm, 1, 0.3)
 
 
 def test_a_palm_in_a_grainy_picture_is_found_if_it_is_smoothed_or_by_the_shipped_model(palms: PalmDetector) -> None:
     picture, random = draw(open_right_hand(320, 240, size=110)), np.random.default_rng(1)
     grainy = [np.clip(picture + random.normal(0, 40, (*picture.shape[:2], 1)), 0, 255) for _ in range(12)]
-    mediapipes = PalmDetector(find_pair("full")[0], 1, 0.3)
+    mediapipes = PalmDetector(find_hand_models("full").palm, 1, 0.3)
     sampled, smoothed, shipped = (
         sum(len(model.detect(each.astype(np.uint8), 1, smoothed=smooth)) for each in grainy)
         for model, smooth in ((mediapipes, False), (mediapipes, True), (palms, False))

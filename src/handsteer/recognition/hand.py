@@ -89,6 +89,18 @@ class Landmarker(Protocol):
         """
         ...
 
+    def look_in_grey(self, image: NDArray[np.uint8], hand: Hand, *, mirrored: bool = False) -> Hand:
+        """Return ``hand``, one of the last frame, ``image``, or what else is seen of it, if that has no colours.
+
+        ``hand`` stays the one that is tracked.
+
+        Args:
+            image: (height, width, 3) uint8, BGR, not mirrored.
+            hand: The hand.
+            mirrored: Whether to look at the mirrored image, which may show another shape.
+        """
+        ...
+
     def follow_only(self, hand: Hand) -> None:
         """Stop tracking all hands of the last frame except ``hand``, to save time."""
         ...

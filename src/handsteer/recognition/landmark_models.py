@@ -19,7 +19,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import cv2
 import numpy as np
@@ -41,12 +41,18 @@ MODELS: Final = {
 
 SHIPPED: Final = {
     "hand_landmark_fast.tflite": "383471f879c29961bb5c2b53a3cb4fc5cf84abe41751c612700b288ed815e1bd",
+    "hand_landmark_grey.tflite": "a40e0266bc96b14a43e4c846958448713619fbe7b83e404a36346a048ba05d74",
     "palm_detection_fast.tflite": "22a88a490d15d26a60dfea09307ebbeab4c37d5fe3ff9c9d4e305a7fcd02145c",
 }
-"""SHA-256 of each model file that is part of handsteer, as made by ``scripts/landmark_model`` and ``palm_model``."""
+"""SHA-256 of each model file that is part of handsteer, made by ``scripts/landmark_model`` and ``distilled_models``."""
 
 Progress = Callable[[int, int], None]
 """Called repeatedly with the number of downloaded bytes and of all bytes."""
+
+_GREY: Final = "hand_landmark_grey.tflite"
+_GREY_LEVELS: Final = 8
+"""Maximum difference of a pixel's colours in a grey picture: video compression makes up to 3, and a photo has 15."""
+_SAMPLED_PX: Final = 8
 
 _PACKAGE: Final = "mediapipe==0.10.21"
 _WHEEL_BYTES: Final = 35_622_638
@@ -98,14 +104,39 @@ def find_model(name: str, directory: Path | None = None) -> Path:
     return path
 
 
-def find_pair(model: str) -> tuple[Path, Path]:
-    """Return the paths of the palm model and the hand landmark model of ``landmarks.model``: fast, full or lite.
+class HandModels(NamedTuple):
+    """The paths of the models that find hands.
+
+    Attributes:
+        palm: The palm model.
+        landmark: The hand landmark model.
+        grey: A second one, for pictures without colours, or None.
+    """
+
+    palm: Path
+    landmark: Path
+    grey: Path | None
+
+
+def find_hand_models(model: str) -> HandModels:
+    """Return the paths of the models of ``landmarks.model``: fast, full or lite.
 
     Raises:
         ModelMissing: One does not exist, or cannot be read.
         ModelCorrupt: The content of one is unexpected.
     """
-    return find_model(f"palm_detection_{model}.tflite"), find_model(f"hand_landmark_{model}.tflite")
+    palm, landmark = find_model(f"palm_detection_{model}.tflite"), find_model(f"hand_landmark_{model}.tflite")
+    return HandModels(palm, landmark, find_model(_GREY) if model == "fast" else None)
+
+
+def is_grey(image: NDArray[np.uint8]) -> bool:
+    """Return whether ``image``, (height, width, 3) uint8, has no colours, apart from what compression adds to it.
+
+    Every eighth pixel in each direction is compared; a hand that can be recognised is larger.
+    """
+    blue, green, red = cv2.split(image[::_SAMPLED_PX, ::_SAMPLED_PX])
+    pairs = ((blue, green), (green, red), (red, blue))
+    return all(cv2.norm(one, other, cv2.NORM_INF) <= _GREY_LEVELS for one, other in pairs)
 
 
 def fetch_models(progress: Progress) -> list[Path]:

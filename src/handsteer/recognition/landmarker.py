@@ -13,6 +13,7 @@ of the models is limited, and the next frame does what is left: its second run o
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from math import inf
 from typing import Final
 
@@ -30,7 +31,7 @@ from handsteer.recognition.estimates import (
     of_different_hands,
 )
 from handsteer.recognition.hand import Hand, check_picture
-from handsteer.recognition.landmark_models import PictureModel, find_pair
+from handsteer.recognition.landmark_models import PictureModel, find_hand_models, is_grey
 from handsteer.recognition.regions import PalmDetector, Roi
 from handsteer.recognition.search import (
     DOUBTFUL_PALM,
@@ -75,15 +76,15 @@ class MediaPipeLandmarker:
 
     def __init__(self, config: LandmarksConfig) -> None:
         self._config = config
-        palm, landmark = find_pair(config.model)
+        self._models = models = find_hand_models(config.model)
         least = config.min_detection_confidence
         doubtful = min(least, DOUBTFUL_PALM) if config.wide_search else None
-        palms = PalmDetector(palm, config.threads, least, doubtful)
+        palms = PalmDetector(models.palm, config.threads, least, doubtful)
         self._search = Search(palms, config.max_hands, wide=config.wide_search)
         self._searched = Stillness()
         self._searched_beside = Stillness()
         self._still = Stillness()
-        self._landmarks = PictureModel(landmark, config.threads)
+        self._landmarks = PictureModel(models.landmark, config.threads)
         self._looked_at: list[Roi] = []
         self._image_size = (0, 0)
         self._start_stream()
@@ -97,6 +98,11 @@ class MediaPipeLandmarker:
         self._had_turn: list[Roi] = []
         self._runs_left = inf
         self._is_first = True
+
+    @cached_property
+    def _grey_landmarks(self) -> PictureModel | None:
+        """The landmark model for pictures without colours, opened when it is needed: most cameras have colours."""
+        return None if self._models.grey is None else PictureModel(self._models.grey, self._config.threads)
 
     def detect(self, image: NDArray[np.uint8], *, search: bool = True, dt_s: float = inf) -> list[Hand]:
         """Return the hands in ``image``, 1 to 32766 pixels a side, as :class:`Landmarker` describes.
@@ -151,6 +157,15 @@ class MediaPipeLandmarker:
         self._hands[index] = hand_of(best, *self._image_size)
         self._followed[index] = best.region
         return self._hands[index]
+
+    def look_in_grey(self, image: NDArray[np.uint8], hand: Hand, *, mirrored: bool = False) -> Hand:
+        """Return ``hand`` as the model for pictures without colours sees it, if ``image`` is one and it is sure."""
+        index = next((number for number, each in enumerate(self._hands) if each is hand), None)
+        if index is None or self._runs_left < 1 or not is_grey(image) or self._grey_landmarks is None:
+            return hand
+        self._runs_left -= 1
+        seen = estimate_region(self._grey_landmarks, image, self._followed[index], mirrored=mirrored)
+        return hand if seen.presence < _AGAIN_PRESENCE else hand_of(seen, *self._image_size)
 
     def follow_only(self, hand: Hand) -> None:
         """Stop tracking all hands of the last frame except ``hand``."""

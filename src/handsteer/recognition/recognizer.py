@@ -14,13 +14,13 @@ from handsteer.recognition.custom_signs import CustomClassifier, load_custom_mod
 from handsteer.recognition.features import PALM, directions
 from handsteer.recognition.filters import Debouncer, Evidence, HandPosition, HandSelector
 from handsteer.recognition.hand import CONNECTIONS, Classifier, Hand, Landmarker, SignGuess
-from handsteer.recognition.landmark_models import find_model, find_pair
+from handsteer.recognition.landmark_models import find_hand_models, find_model
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.profile import ProfiledClassifier, load_profile, profile_path
 from handsteer.recognition.resting import MODEL as PEOPLE_MODEL
 from handsteer.recognition.resting import RestingHands
 from handsteer.recognition.shipped_signs import DEFAULT_MODEL, ShippedClassifier, load_model
-from handsteer.types import NONE, STOP, describe_seen
+from handsteer.types import GO, NONE, STOP, describe_seen
 
 _NOTHING = SignGuess(NONE, 0.0)
 _AT_REST = SignGuess(NONE, 0.0)
@@ -65,7 +65,7 @@ def model_files(config: Config) -> tuple[Path, ...]:
     taught = () if config.signs.model is None else (config.signs.model.expanduser(),)
     own = () if config.signs.profile is None else (profile_path(config.signs.profile),)
     people = (find_model(PEOPLE_MODEL),) if config.landmarks.reject_resting else ()
-    return (*find_pair(config.landmarks.model), *people, DEFAULT_MODEL, *taught, *own)
+    return (*filter(None, find_hand_models(config.landmarks.model)), *people, DEFAULT_MODEL, *taught, *own)
 
 
 @dataclass(frozen=True)
@@ -172,17 +172,20 @@ class Recognizer:
         """Process a frame, ``alone`` or as the next of a stream."""
         # A hand whose sign is being confirmed is effectively selected.
         search = self._selector.wants_search() and self._filter.candidate == NONE
-        hands = self._landmarker.detect(image, search=search, dt_s=dt_s)
-        classified = [self._classifier.classify(hand) for hand in hands]
-        guesses = [self._seen(guess) for guess in classified]
-        if all(guess.sign == NONE for guess in guesses):
+        found = self._landmarker.detect(image, search=search, dt_s=dt_s)
+        classified = [self._classifier.classify(hand) for hand in found]
+        if self._signs(classified) <= {NONE}:
             # The landmark model may not have followed a finger. A sign, Stop above all, does not wait for that.
-            found, hands = hands, [self._landmarker.look_again(image, hand) for hand in hands]
+            found, before = [self._landmarker.look_again(image, hand) for hand in found], found
             classified = [
-                guess if hand is before else self._classifier.classify(hand)
-                for hand, before, guess in zip(hands, found, classified, strict=True)
+                guess if hand is earlier else self._classifier.classify(hand)
+                for hand, earlier, guess in zip(found, before, classified, strict=True)
             ]
-            guesses = [self._seen(guess) for guess in classified]
+        hands = list(found)
+        if self._signs(classified) <= {NONE, GO}:
+            # Without colours, an index finger is lost more often, and what remains looks like a fist.
+            self._look_in_grey(image, hands, classified)
+        guesses = [self._seen(guess) for guess in classified]
         if self._resting is not None:
             self._resting.next_frame(dt_s)
             guesses = self._raised(self._resting, image, hands, guesses, alone=alone, dt_s=dt_s)
@@ -197,9 +200,9 @@ class Recognizer:
             guess = self._bridged(guess, since_s)
         still = self._evidence.is_still(min(since_s, self._config.confirm_time))
         sign = self._filter.step(guess.sign, dt_s, still=still)
-        if hand is not None and guess.sign == sign != NONE:
+        if chosen is not None and guess.sign == sign != NONE:
             self._selector.confirm()
-            self._landmarker.follow_only(hand)
+            self._landmarker.follow_only(found[chosen])
         return Recognition(sign, guess.sign, guess.confidence, self._filter.progress, hand, likelihoods)
 
     def reconfigure(self, config: SignsConfig) -> None:
@@ -221,6 +224,25 @@ class Recognizer:
         self._evidence.reset()
         if self._resting is not None:
             self._resting.reset()
+
+    def _look_in_grey(self, image: NDArray[np.uint8], hands: list[Hand], classified: list[SignGuess]) -> None:
+        """Replace those of ``hands`` that point if seen as in a picture without colours, and what they show.
+
+        Only a finger or a thumb is lost without colours. A fist must point mirrored as well: of 488 views of fists, one
+        more moves the robot without that.
+        """
+        look = self._landmarker.look_in_grey
+        for index, hand in enumerate(hands):
+            seen = look(image, hand)
+            if seen is hand:
+                continue
+            is_fist, guess = self._seen(classified[index]).sign == GO, self._classifier.classify(seen)
+            sign = self._seen(guess).sign
+            if sign in (NONE, STOP, GO):
+                continue
+            if is_fist and self._signs([self._classifier.classify(look(image, hand, mirrored=True))]) != {sign}:
+                continue
+            hands[index], classified[index] = seen, guess
 
     def _raised(
         self,
@@ -254,6 +276,9 @@ class Recognizer:
         likelihood = self._evidence.likelihood(candidate, since_s)
         confidence = self._classifier.confidence(candidate, likelihood)
         return SignGuess(candidate, confidence) if confidence >= self._config.min_confidence else guess
+
+    def _signs(self, classified: Sequence[SignGuess]) -> set[str]:
+        return {self._seen(guess).sign for guess in classified}
 
     def _seen(self, guess: SignGuess) -> SignGuess:
         """Return ``guess`` if above its threshold, else ``NONE``; the confirmed sign has a lower threshold."""

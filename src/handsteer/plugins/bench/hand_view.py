@@ -80,6 +80,10 @@ class HandLandmarker:
         """Return ``hand``: it is located already."""
         return hand
 
+    def look_in_grey(self, image: Image, hand: Hand, *, mirrored: bool = False) -> Hand:
+        """Return ``hand``: it is seen well already."""
+        return hand
+
     def follow_only(self, hand: Hand) -> None:
         """Do nothing: there is one hand."""
 
