@@ -13,13 +13,7 @@ import numpy as np
 import pytest
 
 from handsteer.errors import ModelCorrupt, ModelError, ModelMissing
-from handsteer.recognition.landmark_models import (
-    MODELS,
-    fetch_models,
-    find_model,
-    is_grey,
-    models_dir,
-)
+from handsteer.recognition.landmark_models import MODELS, fetch_models, find_model, is_grey, models_dir
 
 HERE = models_dir()
 """Where the models really are, before a test says otherwise."""

@@ -145,7 +145,7 @@ class MediaPipeLandmarker:
 
         Only in photos and the first frame of a stream: in others, the next frames show as much.
         """
-        index = next((number for number, each in enumerate(self._hands) if each is hand), None)
+        index = self._index_of(hand)
         if index is None or self._runs_left < inf or not self._config.refine_new_hands:
             return hand
         own = self._followed[index]
@@ -160,12 +160,15 @@ class MediaPipeLandmarker:
 
     def look_in_grey(self, image: NDArray[np.uint8], hand: Hand, *, mirrored: bool = False) -> Hand:
         """Return ``hand`` as the model for pictures without colours sees it, if ``image`` is one and it is sure."""
-        index = next((number for number, each in enumerate(self._hands) if each is hand), None)
+        index = self._index_of(hand)
         if index is None or self._runs_left < 1 or not is_grey(image) or self._grey_landmarks is None:
             return hand
         self._runs_left -= 1
         seen = estimate_region(self._grey_landmarks, image, self._followed[index], mirrored=mirrored)
         return hand if seen.presence < _AGAIN_PRESENCE else hand_of(seen, *self._image_size)
+
+    def _index_of(self, hand: Hand) -> int | None:
+        return next((index for index, each in enumerate(self._hands) if each is hand), None)
 
     def follow_only(self, hand: Hand) -> None:
         """Stop tracking all hands of the last frame except ``hand``."""
