@@ -1,8 +1,8 @@
 """Builds the shipped ``hand_landmark_fast.tflite`` from MediaPipe's full model: ``make landmark-model``.
 
 Most of its operations use 8-bit integers. The result depends only on the model and ``ranges.json`` (see ``ranges.py``),
-and is reproducible with the same package versions. With ``--grey``, ``hand_landmark_grey.tflite`` is built in the same
-way from the model that ``scripts/distilled_models/grey_landmark.py`` trains, and ``ranges_grey.json``. Needs
+and is reproducible with the same package versions. With ``--second``, ``hand_landmark_second.tflite`` is built in the
+same way from the model that ``scripts/distilled_models/second_landmark.py`` trains, and ``ranges_second.json``. Needs
 ai-edge-quantizer, which handsteer itself does not.
 """
 
@@ -33,11 +33,11 @@ In integers, the sums between these late layers would cost 0.5 to 0.8 mm of worl
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Make the 8-bit hand landmark model.")
-    parser.add_argument("source", type=Path, help="MediaPipe's hand_landmark_full.tflite, or the grey model")
-    parser.add_argument("--grey", action="store_true", help="build the model for pictures without colours")
+    parser.add_argument("source", type=Path, help="MediaPipe's hand_landmark_full.tflite, or the second model")
+    parser.add_argument("--second", action="store_true", help="build the model for second opinions")
     options = parser.parse_args()
-    name = "grey" if options.grey else "fast"
-    ranges, target = HERE / f"ranges{'_grey' * options.grey}.json", SHIPPED / f"hand_landmark_{name}.tflite"
+    name = "second" if options.second else "fast"
+    ranges, target = HERE / f"ranges{'_second' * options.second}.json", SHIPPED / f"hand_landmark_{name}.tflite"
     logging.getLogger().setLevel(logging.ERROR)
     model = quantized(folded(options.source.read_bytes()), json.loads(ranges.read_text(encoding="utf-8")))
     target.write_bytes(model)

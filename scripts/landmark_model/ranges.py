@@ -1,8 +1,8 @@
 """Measures the output ranges of the hand landmark model's operations on pictures of hands, into ``ranges.json``.
 
 Run ``python scripts/landmark_model/ranges.py FOLDER...`` in the environment of handsteer, with folders of photos as
-for ``crops.photos``; with ``--grey MODEL``, those of what ``scripts/distilled_models/grey_landmark.py`` trains, on
-pictures without colours, into ``ranges_grey.json``. Only the ranges are stored; they identify no person.
+for ``crops.photos``; with ``--second MODEL``, those of what ``scripts/distilled_models/second_landmark.py`` trains, on
+pictures without colours, into ``ranges_second.json``. Only the ranges are stored; they identify no person.
 """
 
 import argparse
@@ -30,13 +30,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Measure the ranges for the 8-bit hand landmark model.")
     parser.add_argument("folders", type=Path, nargs="+", help="photos of people, with an index.csv")
     parser.add_argument("--crops", type=int, default=600, help="number of pictures of hands")
-    parser.add_argument("--grey", type=Path, metavar="MODEL", help="the model for pictures without colours")
+    parser.add_argument("--second", type=Path, metavar="MODEL", help="the model for second opinions")
     options = parser.parse_args()
     pictures = list(crops(options.folders, "choose"))
     source, target = find_model("hand_landmark_full.tflite"), HERE / "ranges.json"
-    if options.grey:
+    if options.second:
+        # Its training pictures have no colours either.
         pictures = [cv2.cvtColor(cv2.cvtColor(each, cv2.COLOR_RGB2GRAY), cv2.COLOR_GRAY2RGB) for each in pictures]
-        source, target = options.grey, HERE / "ranges_grey.json"
+        source, target = options.second, HERE / "ranges_second.json"
     if not pictures:
         raise SystemExit("no hand is found in these photos")
     chosen = np.random.default_rng(0).permutation(len(pictures))[: options.crops]

@@ -311,47 +311,52 @@ def test_no_hand_is_seen_again_after_the_first_frame_of_a_stream(
         assert len(runs) == (0 if number else 4)
 
 
-def grey(image: np.ndarray) -> np.ndarray:
-    return np.asarray(cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR), np.uint8)
-
-
-def test_a_hand_in_a_picture_without_colours_is_seen_by_a_second_model(
-    landmarker: MediaPipeLandmarker, runs: list[int]
-) -> None:
+def test_a_second_model_sees_a_hand_as_it_is_and_mirrored(landmarker: MediaPipeLandmarker, runs: list[int]) -> None:
     points = open_right_hand(320, 250)
-    for frame, is_seen in ((grey(draw(points)), True), (draw(points), False)):
-        landmarker.reset()
-        for number in range(3):
-            (hand,) = landmarker.detect(frame, dt_s=DT)
-            for mirrored in (False, True) if number == 0 else (False,):
-                runs.clear()
-                seen = landmarker.look_in_grey(frame, hand, mirrored=mirrored)
-                assert (seen is not hand, len(runs)) == (is_seen, is_seen)
-                assert distance(seen, points) < 20
-        landmarker.follow_only(hand)
-        assert len(landmarker.detect(frame, dt_s=DT)) == 1
+    frame = draw(points)
+    for _ in range(3):
+        (hand,) = landmarker.detect(frame, search=False, dt_s=DT)
+        runs.clear()
+        seen = landmarker.second_opinion(frame, hand)
+        assert seen is not None
+        assert len(seen) == len(runs) == 2
+        assert not np.array_equal(seen[0].points, seen[1].points)
+        assert all(distance(each, points) < 20 for each in seen)
+    landmarker.follow_only(hand)
+    assert len(landmarker.detect(frame, dt_s=DT)) == 1
 
 
-def test_a_second_model_that_is_not_sure_of_a_hand_changes_nothing(landmarker: MediaPipeLandmarker) -> None:
-    frame = grey(draw(open_right_hand(320, 250)))
+def test_a_second_model_that_is_not_sure_has_no_opinion(
+    landmarker: MediaPipeLandmarker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frame = draw(open_right_hand(320, 250))
     (hand,) = landmarker.detect(frame, dt_s=DT)
-    assert landmarker.look_in_grey(np.full_like(frame, 90), hand) is hand
+    assert landmarker.second_opinion(np.full_like(frame, 90), hand) == ()
+    monkeypatch.setattr(cv2, "flip", lambda image, _: np.full_like(image, 90))
+    assert len(landmarker.second_opinion(frame, hand) or ()) == 1
 
 
-def test_looks_in_grey_are_runs_of_the_model_in_a_frame(landmarker: MediaPipeLandmarker, runs: list[int]) -> None:
-    frame = grey(draw(open_right_hand(320, 250)))
+def test_second_opinions_are_runs_of_the_model_in_a_frame(landmarker: MediaPipeLandmarker, runs: list[int]) -> None:
+    frame = draw(open_right_hand(320, 250))
     for _ in range(3):
         (hand,) = landmarker.detect(frame, dt_s=DT)
     runs.clear()
-    assert landmarker.look_in_grey(frame, hand) is not hand
-    assert [landmarker.look_in_grey(frame, hand) for _ in range(6)][-1] is hand
+    assert landmarker.second_opinion(frame, hand)
+    assert [landmarker.second_opinion(frame, hand) for _ in range(3)][-1] is None
     assert len(runs) <= 5
 
 
-def test_mediapipe_s_own_models_have_no_second_one_for_grey_pictures() -> None:
-    landmarker, frame = MediaPipeLandmarker(LandmarksConfig(model="full")), grey(draw(open_right_hand(320, 250)))
+def test_a_hand_of_an_earlier_frame_has_no_second_opinion(landmarker: MediaPipeLandmarker) -> None:
+    frame = draw(open_right_hand(320, 250))
+    (hand,) = landmarker.detect(frame, dt_s=DT)
+    landmarker.reset()
+    assert landmarker.second_opinion(frame, hand) == ()
+
+
+def test_mediapipe_s_own_models_have_no_second_opinions() -> None:
+    landmarker, frame = MediaPipeLandmarker(LandmarksConfig(model="full")), draw(open_right_hand(320, 250))
     (hand,) = landmarker.detect(frame)
-    assert landmarker.look_in_grey(frame, hand) is hand
+    assert landmarker.second_opinion(frame, hand) == ()
 
 
 def test_a_region_that_is_seen_mirrored_shows_the_same_hand() -> None:

@@ -9,8 +9,10 @@ from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import BACKWARD, FORWARD, GO, NONE, SIGNS, STOP
 from tests.recognition.hands import RecordedLandmarker, moved, show_fingers, show_sign
 
-IMAGE = np.zeros((480, 640, 3), np.uint8)
+GREY = np.zeros((480, 640, 3), np.uint8)
+IMAGE = np.full((480, 640, 3), (0, 40, 90), np.uint8)
 HAND = show_sign(FORWARD)
+PEACE = show_fingers("index", "middle")
 CLASSIFIER = ShippedClassifier(load_model())
 
 
@@ -117,18 +119,18 @@ class Unsure(RecordedLandmarker):
         return self.better
 
 
-class UnsureInGrey(Unsure):
-    """Sees other hands in grey, and notes at which hands it looked, and which it goes on to follow."""
+class Doubted(Unsure):
+    """Has these second opinions, and notes of which hands, and which it goes on to follow."""
 
-    def __init__(self, frames: list[list[Hand]], grey: Hand = HAND, mirrored: Hand = HAND) -> None:
+    def __init__(self, frames: list[list[Hand]], *opinions: Hand) -> None:
         super().__init__(frames, frames[0][0])
-        self.in_grey = {False: grey, True: mirrored}
-        self.asked_in_grey: list[Hand] = []
+        self.opinions: tuple[Hand, ...] | None = opinions or (HAND, HAND)
+        self.doubted: list[Hand] = []
         self.followed: list[Hand] = []
 
-    def look_in_grey(self, image: np.ndarray, hand: Hand, *, mirrored: bool = False) -> Hand:
-        self.asked_in_grey.append(hand)
-        return self.in_grey[mirrored]
+    def second_opinion(self, image: np.ndarray, hand: Hand) -> tuple[Hand, ...] | None:
+        self.doubted.append(hand)
+        return self.opinions
 
     def follow_only(self, hand: Hand) -> None:
         self.followed.append(hand)
@@ -142,48 +144,94 @@ def test_a_hand_without_a_sign_is_seen_again() -> None:
     assert len(landmarker.asked) == 1
 
 
-def test_a_hand_without_a_sign_is_seen_in_grey_after_that() -> None:
-    peace, better = show_fingers("index", "middle"), moved(show_fingers("index", "middle"), x_px=5.0)
-    landmarker = UnsureInGrey([[peace]])
+def test_a_second_opinion_is_asked_for_after_that() -> None:
+    peace, better = PEACE, moved(PEACE, x_px=5.0)
+    landmarker = Doubted([[peace]])
     landmarker.better = better
     recognition = Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE)
     assert (recognition.sign, recognition.hand) == (FORWARD, HAND)
-    assert landmarker.asked_in_grey == [better]
+    assert landmarker.doubted == [better]
 
 
-@pytest.mark.parametrize("shown", [show_fingers("index", "middle"), show_sign(GO)])
-@pytest.mark.parametrize("in_grey", [show_fingers("index", "middle"), show_sign(STOP), show_sign(GO)])
-def test_a_hand_that_does_not_point_in_grey_stays_as_it_was_seen(shown: Hand, in_grey: Hand) -> None:
-    landmarker = UnsureInGrey([[shown]], moved(in_grey, x_px=5.0), moved(in_grey, x_px=5.0))
+@pytest.mark.parametrize("shown", [PEACE, show_sign(GO)])
+@pytest.mark.parametrize(
+    "opinions",
+    [
+        *((each, each) for each in (moved(PEACE, x_px=5.0), moved(show_sign(STOP), x_px=5.0))),
+        *((HAND, other) for other in (PEACE, show_sign(GO), show_sign(BACKWARD))),
+        (show_sign(GO), HAND),
+        (HAND,),
+        (),
+        None,
+    ],
+)
+def test_a_hand_stays_as_it_was_seen_unless_second_opinions_agree_on_a_sign(
+    shown: Hand, opinions: tuple[Hand, ...] | None
+) -> None:
+    landmarker = Doubted([[shown]])
+    landmarker.opinions = opinions
     recognition = Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE)
     assert (recognition.sign, recognition.hand) == (CLASSIFIER.classify(shown).sign, shown)
 
 
-@pytest.mark.parametrize(
-    ("grey", "mirrored", "sign"),
-    [(HAND, HAND, FORWARD), (HAND, show_sign(GO), GO), (HAND, show_sign(BACKWARD), GO), (show_sign(GO), HAND, GO)],
-)
-def test_a_fist_is_another_sign_if_it_is_so_mirrored_too(grey: Hand, mirrored: Hand, sign: str) -> None:
-    landmarker = UnsureInGrey([[show_sign(GO)]], grey, mirrored)
-    assert Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE).sign == sign
+@pytest.mark.parametrize("opinions", [(HAND,), (HAND, PEACE), (HAND, show_sign(GO))])
+def test_without_colours_the_first_opinion_is_enough_unless_a_fist_is_seen(opinions: tuple[Hand, ...]) -> None:
+    for shown, sign in ((PEACE, FORWARD), (show_sign(GO), GO)):
+        landmarker = Doubted([[shown]], *opinions)
+        assert Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(GREY).sign == sign
 
 
-def test_a_hand_that_is_seen_in_grey_is_followed_as_it_was_found() -> None:
-    found = show_fingers("index", "middle")
-    landmarker = UnsureInGrey([[found]] * 10)
+def test_a_fist_is_another_sign_by_a_second_opinion() -> None:
+    landmarker = Doubted([[show_sign(GO)]])
+    assert Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE).sign == FORWARD
+
+
+def test_a_hand_with_a_second_opinion_is_followed_as_it_was_found() -> None:
+    landmarker = Doubted([[PEACE]] * 10)
     stream = Recognizer(landmarker=landmarker, classifier=CLASSIFIER)
     assert [stream.step(IMAGE, 0.04).sign for _ in range(10)][-1] == FORWARD
     assert landmarker.followed
-    assert all(hand is found for hand in landmarker.followed)
+    assert all(hand is PEACE for hand in landmarker.followed)
+
+
+def test_second_opinions_that_change_nothing_are_asked_for_now_and_then() -> None:
+    landmarker = Doubted([[PEACE]] * 40, PEACE, PEACE)
+    stream = Recognizer(landmarker=landmarker, classifier=CLASSIFIER)
+    for _ in range(30):
+        stream.step(IMAGE, 0.04)
+    assert 3 <= len(landmarker.doubted) <= 4
+    stream.recognize(IMAGE)
+    stream.step(IMAGE, 0.04)
+    assert len(landmarker.doubted) in (5, 6)
+
+
+def test_second_opinions_that_change_something_are_asked_for_in_each_frame_and_may_fail_once() -> None:
+    landmarker = Doubted([[PEACE]] * 40)
+    stream = Recognizer(landmarker=landmarker, classifier=CLASSIFIER)
+    signs = []
+    for number in range(30):
+        landmarker.opinions = (PEACE, PEACE) if number % 5 == 4 else (HAND, HAND)
+        signs.append(stream.step(IMAGE, 0.04).sign)
+    assert len(landmarker.doubted) == 30
+    assert signs[10:] == [FORWARD] * 20
+
+
+def test_a_frame_without_time_for_a_second_opinion_leaves_it_to_the_next() -> None:
+    landmarker = Doubted([[PEACE]] * 10)
+    stream = Recognizer(landmarker=landmarker, classifier=CLASSIFIER)
+    landmarker.opinions = None
+    for _ in range(5):
+        stream.step(IMAGE, 0.04)
+    assert len(landmarker.doubted) == 5
 
 
 def test_no_hand_is_seen_again_while_any_shows_a_sign() -> None:
-    peace = moved(show_fingers("index", "middle"), x_px=200)
+    peace = moved(PEACE, x_px=200)
     for hands, sign in (([show_sign(STOP)], STOP), ([peace, show_sign(STOP)], STOP), ([HAND], FORWARD)):
-        landmarker = UnsureInGrey([hands])
+        landmarker = Doubted([hands])
         assert Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE).sign == sign
         assert not landmarker.asked
-        assert not landmarker.asked_in_grey
+        assert not landmarker.doubted
 
 
 def test_a_sign_that_counts_goes_on_while_the_hand_moves() -> None:

@@ -1,4 +1,4 @@
-"""Filters over time: the active hand of several, the likelihoods of the last frames, the confirmed sign, positions."""
+"""Filters over time: the active hand of several, likelihoods, when to doubt them, the confirmed sign, positions."""
 
 import math
 from collections import deque
@@ -22,6 +22,9 @@ _MUCH_SMALLER: Final = 0.6
 _FRAMES: Final = 12
 _STILL: Final = 0.25
 """Largest movement of a still hand during the confirmation, in hand sizes; chosen, not measured."""
+
+_OPINION_PERIOD_S: Final = 0.3
+"""Time from one second opinion to the next, unless the last ones have changed what is seen."""
 
 _SPEED_HZ: Final = 1.0
 """Cutoff frequency for the speed in the One-Euro filter, as its authors have it."""
@@ -197,6 +200,29 @@ class Evidence:
             last.append(each)
             age_s += each.dt_s
         return last
+
+
+class OpinionTimes:
+    """When second opinions are due: they take as long as a frame, and most change nothing."""
+
+    def __init__(self) -> None:
+        self._since_any_s = self._since_change_s = math.inf
+
+    @property
+    def are_due(self) -> bool:
+        """Whether to ask in this frame."""
+        return self._since_any_s >= _OPINION_PERIOD_S or self._since_change_s < _OPINION_PERIOD_S
+
+    def wait(self, dt_s: float) -> None:
+        """Let ``dt_s`` seconds pass, >= 0."""
+        self._since_any_s += dt_s
+        self._since_change_s += dt_s
+
+    def note(self, *, has_changed: bool) -> None:
+        """Record an opinion, and whether it has changed what is seen."""
+        self._since_any_s = 0.0
+        if has_changed:
+            self._since_change_s = 0.0
 
 
 class Debouncer:

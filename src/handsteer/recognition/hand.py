@@ -89,15 +89,13 @@ class Landmarker(Protocol):
         """
         ...
 
-    def look_in_grey(self, image: NDArray[np.uint8], hand: Hand, *, mirrored: bool = False) -> Hand:
-        """Return ``hand``, one of the last frame, ``image``, or what else is seen of it, if that has no colours.
+    def second_opinion(self, image: NDArray[np.uint8], hand: Hand) -> tuple[Hand, ...] | None:
+        """Return ``hand``, one of the last frame, ``image``, as it is seen in up to two other ways.
 
         ``hand`` stays the one that is tracked.
 
-        Args:
-            image: (height, width, 3) uint8, BGR, not mirrored.
-            hand: The hand.
-            mirrored: Whether to look at the mirrored image, which may show another shape.
+        Returns:
+            The hand in each way in which it surely is one, the better way first; None if this frame has no time.
         """
         ...
 

@@ -41,7 +41,7 @@ MODELS: Final = {
 
 SHIPPED: Final = {
     "hand_landmark_fast.tflite": "383471f879c29961bb5c2b53a3cb4fc5cf84abe41751c612700b288ed815e1bd",
-    "hand_landmark_grey.tflite": "a40e0266bc96b14a43e4c846958448713619fbe7b83e404a36346a048ba05d74",
+    "hand_landmark_second.tflite": "a40e0266bc96b14a43e4c846958448713619fbe7b83e404a36346a048ba05d74",
     "palm_detection_fast.tflite": "22a88a490d15d26a60dfea09307ebbeab4c37d5fe3ff9c9d4e305a7fcd02145c",
 }
 """SHA-256 of each model file that is part of handsteer, made by ``scripts/landmark_model`` and ``distilled_models``."""
@@ -49,7 +49,7 @@ SHIPPED: Final = {
 Progress = Callable[[int, int], None]
 """Called repeatedly with the number of downloaded bytes and of all bytes."""
 
-_GREY: Final = "hand_landmark_grey.tflite"
+_SECOND: Final = "hand_landmark_second.tflite"
 _GREY_LEVELS: Final = 8
 """Maximum difference of a pixel's colours in a grey picture: video compression makes up to 3, and a photo has 15."""
 _SAMPLED_PX: Final = 8
@@ -110,12 +110,12 @@ class HandModels(NamedTuple):
     Attributes:
         palm: The palm model.
         landmark: The hand landmark model.
-        grey: A second one, for pictures without colours, or None.
+        second: Another one, for second opinions, or None.
     """
 
     palm: Path
     landmark: Path
-    grey: Path | None
+    second: Path | None
 
 
 def find_hand_models(model: str) -> HandModels:
@@ -126,7 +126,7 @@ def find_hand_models(model: str) -> HandModels:
         ModelCorrupt: The content of one is unexpected.
     """
     palm, landmark = find_model(f"palm_detection_{model}.tflite"), find_model(f"hand_landmark_{model}.tflite")
-    return HandModels(palm, landmark, find_model(_GREY) if model == "fast" else None)
+    return HandModels(palm, landmark, find_model(_SECOND) if model == "fast" else None)
 
 
 def is_grey(image: NDArray[np.uint8]) -> bool:

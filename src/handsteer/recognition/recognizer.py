@@ -12,9 +12,9 @@ from handsteer import doors
 from handsteer.config import Config, SignsConfig
 from handsteer.recognition.custom_signs import CustomClassifier, load_custom_model
 from handsteer.recognition.features import PALM, directions
-from handsteer.recognition.filters import Debouncer, Evidence, HandPosition, HandSelector
+from handsteer.recognition.filters import Debouncer, Evidence, HandPosition, HandSelector, OpinionTimes
 from handsteer.recognition.hand import CONNECTIONS, Classifier, Hand, Landmarker, SignGuess
-from handsteer.recognition.landmark_models import find_hand_models, find_model
+from handsteer.recognition.landmark_models import find_hand_models, find_model, is_grey
 from handsteer.recognition.landmarker import MediaPipeLandmarker
 from handsteer.recognition.profile import ProfiledClassifier, load_profile, profile_path
 from handsteer.recognition.resting import MODEL as PEOPLE_MODEL
@@ -120,6 +120,7 @@ class Recognizer:
         self._selector = HandSelector(config.signs)
         self._evidence = Evidence()
         self._resting = RestingHands(config.landmarks.threads) if config.landmarks.reject_resting else None
+        self._opinions = OpinionTimes()
         self._config = config.signs
 
     @property
@@ -182,9 +183,10 @@ class Recognizer:
                 for hand, earlier, guess in zip(found, before, classified, strict=True)
             ]
         hands = list(found)
-        if self._signs(classified) <= {NONE, GO}:
-            # Without colours, an index finger is lost more often, and what remains looks like a fist.
-            self._look_in_grey(image, hands, classified)
+        self._opinions.wait(dt_s)
+        if self._signs(classified) <= {NONE, GO} and (alone or self._opinions.are_due):
+            # A lost finger leaves what looks like a fist.
+            self._ask_second_opinion(image, hands, classified)
         guesses = [self._seen(guess) for guess in classified]
         if self._resting is not None:
             self._resting.next_frame(dt_s)
@@ -222,27 +224,27 @@ class Recognizer:
         self._filter.reset()
         self._selector.reset()
         self._evidence.reset()
+        self._opinions = OpinionTimes()
         if self._resting is not None:
             self._resting.reset()
 
-    def _look_in_grey(self, image: NDArray[np.uint8], hands: list[Hand], classified: list[SignGuess]) -> None:
-        """Replace those of ``hands`` that point if seen as in a picture without colours, and what they show.
+    def _ask_second_opinion(self, image: NDArray[np.uint8], hands: list[Hand], classified: list[SignGuess]) -> None:
+        """Replace those of ``hands`` that point by a second opinion, and what they show.
 
-        Only a finger or a thumb is lost without colours. A fist must point mirrored as well: of 488 views of fists, one
-        more moves the robot without that.
+        Only a finger or a thumb is lost, so nothing else counts. Both ways of seeing a hand have to agree; one is
+        enough where colours are missing, with which most are lost, unless a fist is seen.
         """
-        look = self._landmarker.look_in_grey
         for index, hand in enumerate(hands):
-            seen = look(image, hand)
-            if seen is hand:
+            seen = self._landmarker.second_opinion(image, hand)
+            if seen is None:
                 continue
-            is_fist, guess = self._seen(classified[index]).sign == GO, self._classifier.classify(seen)
-            sign = self._seen(guess).sign
-            if sign in (NONE, STOP, GO):
-                continue
-            if is_fist and self._signs([self._classifier.classify(look(image, hand, mirrored=True))]) != {sign}:
-                continue
-            hands[index], classified[index] = seen, guess
+            needed = 1 if self._seen(classified[index]).sign == NONE and is_grey(image) else 2
+            guesses = [self._classifier.classify(each) for each in seen[:needed]]
+            signs = self._signs(guesses)
+            points = len(guesses) == needed and len(signs) == 1 and signs.isdisjoint((NONE, STOP, GO))
+            if points:
+                hands[index], classified[index] = seen[0], guesses[0]
+            self._opinions.note(has_changed=points)
 
     def _raised(
         self,

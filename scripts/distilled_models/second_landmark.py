@@ -1,15 +1,16 @@
-"""Trains the hand landmark model for pictures without colours, from which ``hand_landmark_grey.tflite`` is made.
+"""Trains the hand landmark model for second opinions, from which ``hand_landmark_second.tflite`` is made.
 
 MediaPipe's landmark model (the teacher) sees hands in colour, as they are and mirrored; a copy of it learns to see the
-same in them without colours, and what the shipped classifier makes of it. Its size and speed stay as they are.
+same in them without colours, and what the shipped classifier makes of it. In pictures with colours, too, it errs in
+other ones than the teacher. Its size and speed stay as they are.
 
 Run it with the photos that the tables of docs/signs.md call tuning, in handsteer's environment with PyTorch installed,
 then measure the ranges of the new model's values, and convert it to 8-bit integers as ``make landmark-model`` does::
 
     cd ../shared/data
-    python .../scripts/distilled_models/grey_landmark.py hagrid-dev photos --target grey.tflite
-    python .../scripts/landmark_model/ranges.py hagrid-dev photos --grey grey.tflite
-    .../quantizer/bin/python .../scripts/landmark_model/build.py grey.tflite --grey
+    python .../scripts/distilled_models/second_landmark.py hagrid-dev photos --target second.tflite
+    python .../scripts/landmark_model/ranges.py hagrid-dev photos --second second.tflite
+    .../quantizer/bin/python .../scripts/landmark_model/build.py second.tflite --second
 
 Training does not give the same file byte for byte: PyTorch's sums differ between processors, and the number of steps
 with time. ``make bench-signs`` says whether another one is better. The shipped file had 4,200 steps: 2,400 with an
@@ -59,7 +60,7 @@ _LUMA: Final = np.array([0.114, 0.587, 0.299], np.float32)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Train the hand landmark model for pictures without colours.")
+    parser = argparse.ArgumentParser(description="Train the hand landmark model for second opinions.")
     parser.add_argument("folders", type=Path, nargs="+", help="photos of people, with an index.csv")
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--start", type=Path, help="a model of an earlier run, with float32 weights, to train further")
