@@ -56,9 +56,9 @@ class PaintedLandmarker:
     def look_again(self, image: NDArray[np.uint8], hand: Hand) -> Hand:
         return hand
 
-    def second_opinion(self, image: NDArray[np.uint8], hand: Hand) -> tuple[Hand, ...]:
-        """Return nothing: it is seen well already."""
-        return ()
+    def second_opinion(self, image: NDArray[np.uint8], hand: Hand, *, mirrored: bool = False) -> Hand:
+        """Return ``hand``: it is seen well already."""
+        return hand
 
     def follow_only(self, hand: Hand) -> None:
         pass

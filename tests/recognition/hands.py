@@ -85,9 +85,9 @@ class RecordedLandmarker:
         """Return ``hand``: there is nothing else in a recording."""
         return hand
 
-    def second_opinion(self, image: np.ndarray, hand: Hand) -> tuple[Hand, ...] | None:
-        """Return nothing: there is nothing else in a recording."""
-        return ()
+    def second_opinion(self, image: np.ndarray, hand: Hand, *, mirrored: bool = False) -> Hand | None:
+        """Return ``hand``: there is nothing else in a recording."""
+        return hand
 
     def follow_only(self, hand: Hand) -> None:
         """Do nothing: a recording continues with all its hands."""

@@ -311,29 +311,27 @@ def test_no_hand_is_seen_again_after_the_first_frame_of_a_stream(
         assert len(runs) == (0 if number else 4)
 
 
-def test_a_second_model_sees_a_hand_as_it_is_and_mirrored(landmarker: MediaPipeLandmarker, runs: list[int]) -> None:
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_second_model_sees_a_hand(landmarker: MediaPipeLandmarker, runs: list[int], mirrored: bool) -> None:
     points = open_right_hand(320, 250)
     frame = draw(points)
     for _ in range(3):
         (hand,) = landmarker.detect(frame, search=False, dt_s=DT)
         runs.clear()
-        seen = landmarker.second_opinion(frame, hand)
+        seen = landmarker.second_opinion(frame, hand, mirrored=mirrored)
         assert seen is not None
-        assert len(seen) == len(runs) == 2
-        assert not np.array_equal(seen[0].points, seen[1].points)
-        assert all(distance(each, points) < 20 for each in seen)
+        assert seen is not hand
+        assert len(runs) == 1
+        assert distance(seen, points) < 20
     landmarker.follow_only(hand)
     assert len(landmarker.detect(frame, dt_s=DT)) == 1
 
 
-def test_a_second_model_that_is_not_sure_has_no_opinion(
-    landmarker: MediaPipeLandmarker, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_second_model_that_is_not_sure_has_no_opinion(landmarker: MediaPipeLandmarker, mirrored: bool) -> None:
     frame = draw(open_right_hand(320, 250))
     (hand,) = landmarker.detect(frame, dt_s=DT)
-    assert landmarker.second_opinion(np.full_like(frame, 90), hand) == ()
-    monkeypatch.setattr(cv2, "flip", lambda image, _: np.full_like(image, 90))
-    assert len(landmarker.second_opinion(frame, hand) or ()) == 1
+    assert landmarker.second_opinion(np.full_like(frame, 90), hand, mirrored=mirrored) is hand
 
 
 def test_second_opinions_are_runs_of_the_model_in_a_frame(landmarker: MediaPipeLandmarker, runs: list[int]) -> None:
@@ -341,8 +339,11 @@ def test_second_opinions_are_runs_of_the_model_in_a_frame(landmarker: MediaPipeL
     for _ in range(3):
         (hand,) = landmarker.detect(frame, dt_s=DT)
     runs.clear()
-    assert landmarker.second_opinion(frame, hand)
-    assert [landmarker.second_opinion(frame, hand) for _ in range(3)][-1] is None
+    opinions = [landmarker.second_opinion(frame, hand) for _ in range(6)]
+    assert opinions[0] is not None
+    assert opinions[-1] is None
+    assert landmarker.second_opinion(frame, hand, mirrored=True) is not None
+    assert landmarker.second_opinion(frame, hand, mirrored=True) is None
     assert len(runs) <= 5
 
 
@@ -350,13 +351,13 @@ def test_a_hand_of_an_earlier_frame_has_no_second_opinion(landmarker: MediaPipeL
     frame = draw(open_right_hand(320, 250))
     (hand,) = landmarker.detect(frame, dt_s=DT)
     landmarker.reset()
-    assert landmarker.second_opinion(frame, hand) == ()
+    assert landmarker.second_opinion(frame, hand) is hand
 
 
 def test_mediapipe_s_own_models_have_no_second_opinions() -> None:
     landmarker, frame = MediaPipeLandmarker(LandmarksConfig(model="full")), draw(open_right_hand(320, 250))
     (hand,) = landmarker.detect(frame)
-    assert landmarker.second_opinion(frame, hand) == ()
+    assert landmarker.second_opinion(frame, hand) is hand
 
 
 def test_a_region_that_is_seen_mirrored_shows_the_same_hand() -> None:

@@ -23,7 +23,7 @@ _FRAMES: Final = 12
 _STILL: Final = 0.25
 """Largest movement of a still hand during the confirmation, in hand sizes; chosen, not measured."""
 
-_OPINION_PERIOD_S: Final = 0.3
+_OPINION_PERIOD_S: Final = 0.5
 """Time from one second opinion to the next, unless the last ones have changed what is seen."""
 
 _SPEED_HZ: Final = 1.0
@@ -203,7 +203,7 @@ class Evidence:
 
 
 class OpinionTimes:
-    """When second opinions are due: they take as long as a frame, and most change nothing."""
+    """When second opinions are due: each takes as long as a frame, and most change nothing."""
 
     def __init__(self) -> None:
         self._since_any_s = self._since_change_s = math.inf

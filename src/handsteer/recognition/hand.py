@@ -89,13 +89,18 @@ class Landmarker(Protocol):
         """
         ...
 
-    def second_opinion(self, image: NDArray[np.uint8], hand: Hand) -> tuple[Hand, ...] | None:
-        """Return ``hand``, one of the last frame, ``image``, as it is seen in up to two other ways.
+    def second_opinion(self, image: NDArray[np.uint8], hand: Hand, *, mirrored: bool = False) -> Hand | None:
+        """Return ``hand``, one of the last frame, ``image``, as it is seen in another way, if it surely is one so.
 
         ``hand`` stays the one that is tracked.
 
+        Args:
+            image: (height, width, 3) uint8, BGR, not mirrored.
+            hand: The hand.
+            mirrored: Whether to look at the mirrored image, which may show another shape.
+
         Returns:
-            The hand in each way in which it surely is one, the better way first; None if this frame has no time.
+            The other hand, ``hand`` itself without one, or None if this frame has no time for it, nor for the mirrored.
         """
         ...
 

@@ -49,10 +49,10 @@ _RUNS_WITH_PALMS: Final = 2
 """Likewise in a frame with palm detection; a lost hand's count too. MediaPipe's ``full`` models take longer for one."""
 _AGAIN_PRESENCE: Final = 0.9
 """Minimum presence in a second look: of four hands without a sign that it read as a motion, two had less."""
-_OPINIONS: Final = ((False, _AGAIN_PRESENCE), (True, 0.95))
-"""Whether mirrored, and the minimum presence there, of the looks of the second model at a hand.
+_OPINION_PRESENCE: Final = {False: _AGAIN_PRESENCE, True: 0.95}
+"""Minimum presence in a second opinion, by whether it is mirrored.
 
-With 0.9 mirrored as well, a hand that hangs gave ``Backward`` in two of 11,220 views without a sign.
+With 0.9 mirrored too, a hand that hangs gave ``Backward`` in two of 11,220 views without a sign.
 """
 _SURER: Final = 0.003
 """Presence by which the model has to be surer in it."""
@@ -163,21 +163,16 @@ class MediaPipeLandmarker:
         self._followed[index] = best.region
         return self._hands[index]
 
-    def second_opinion(self, image: NDArray[np.uint8], hand: Hand) -> tuple[Hand, ...] | None:
-        """Return ``hand`` as a second landmark model sees it, if it is sure; if it is surer mirrored, so as well."""
+    def second_opinion(self, image: NDArray[np.uint8], hand: Hand, *, mirrored: bool = False) -> Hand | None:
+        """Return ``hand`` as a second landmark model sees it, if it is sure, as :class:`Landmarker` describes."""
         index, model = self._index_of(hand), self._second_model
         if index is None or model is None:
-            return ()
-        if self._runs_left < len(_OPINIONS):
+            return hand
+        if self._runs_left < (1 if mirrored else 2):
             return None
-        seen: list[Hand] = []
-        for mirrored, least in _OPINIONS:
-            self._runs_left -= 1
-            estimate = estimate_region(model, image, self._followed[index], mirrored=mirrored)
-            if estimate.presence < least:
-                break
-            seen.append(hand_of(estimate, *self._image_size))
-        return tuple(seen)
+        self._runs_left -= 1
+        seen = estimate_region(model, image, self._followed[index], mirrored=mirrored)
+        return hand if seen.presence < _OPINION_PRESENCE[mirrored] else hand_of(seen, *self._image_size)
 
     def _index_of(self, hand: Hand) -> int | None:
         return next((index for index, each in enumerate(self._hands) if each is hand), None)

@@ -234,16 +234,19 @@ class Recognizer:
         Only a finger or a thumb is lost, so nothing else counts. Both ways of seeing a hand have to agree; one is
         enough where colours are missing, with which most are lost, unless a fist is seen.
         """
+        ask = self._landmarker.second_opinion
         for index, hand in enumerate(hands):
-            seen = self._landmarker.second_opinion(image, hand)
+            seen = ask(image, hand)
             if seen is None:
                 continue
-            needed = 1 if self._seen(classified[index]).sign == NONE and is_grey(image) else 2
-            guesses = [self._classifier.classify(each) for each in seen[:needed]]
-            signs = self._signs(guesses)
-            points = len(guesses) == needed and len(signs) == 1 and signs.isdisjoint((NONE, STOP, GO))
+            guess = self._classifier.classify(seen)
+            sign = self._seen(guess).sign
+            points = seen is not hand and sign not in (NONE, STOP, GO)
+            if points and not (self._seen(classified[index]).sign == NONE and is_grey(image)):
+                other = ask(image, hand, mirrored=True) or hand
+                points = other is not hand and self._seen(self._classifier.classify(other)).sign == sign
             if points:
-                hands[index], classified[index] = seen[0], guesses[0]
+                hands[index], classified[index] = seen, guess
             self._opinions.note(has_changed=points)
 
     def _raised(

@@ -54,7 +54,7 @@ class Room:
     def look_again(self, image: np.ndarray, hand: Hand) -> Hand:
         raise AssertionError("a calibration reads hands as they are found")
 
-    def second_opinion(self, image: np.ndarray, hand: Hand) -> tuple[Hand, ...]:
+    def second_opinion(self, image: np.ndarray, hand: Hand, *, mirrored: bool = False) -> Hand:
         raise AssertionError("a calibration reads hands as they are found")
 
     def follow_only(self, hand: Hand) -> None:

@@ -80,9 +80,9 @@ class HandLandmarker:
         """Return ``hand``: it is located already."""
         return hand
 
-    def second_opinion(self, image: Image, hand: Hand) -> tuple[Hand, ...]:
-        """Return nothing: it is seen well already."""
-        return ()
+    def second_opinion(self, image: Image, hand: Hand, *, mirrored: bool = False) -> Hand:
+        """Return ``hand``: it is seen well already."""
+        return hand
 
     def follow_only(self, hand: Hand) -> None:
         """Do nothing: there is one hand."""
