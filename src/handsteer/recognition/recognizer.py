@@ -231,8 +231,8 @@ class Recognizer:
     def _ask_second_opinion(self, image: NDArray[np.uint8], hands: list[Hand], classified: list[SignGuess]) -> None:
         """Replace those of ``hands`` that point by a second opinion, and what they show.
 
-        Only a finger or a thumb is lost, so nothing else counts. Both ways of seeing a hand have to agree; one is
-        enough where colours are missing, with which most are lost, unless a fist is seen.
+        Only a finger or a thumb is lost, so nothing else counts. The hand has to point mirrored as well; not in a
+        picture without colours, in which most fingers are lost, unless a fist is seen.
         """
         ask = self._landmarker.second_opinion
         for index, hand in enumerate(hands):
