@@ -173,13 +173,6 @@ def test_a_hand_stays_as_it_was_seen_unless_second_opinions_agree_on_a_sign(
     assert (recognition.sign, recognition.hand) == (CLASSIFIER.classify(shown).sign, shown)
 
 
-@pytest.mark.parametrize("shown", [PEACE, HAND])
-def test_a_hand_of_which_there_is_no_other_opinion_stays_as_it_was_seen(shown: Hand) -> None:
-    landmarker = Doubted([[shown]], shown, shown)
-    recognition = Recognizer(landmarker=landmarker, classifier=CLASSIFIER).recognize(IMAGE)
-    assert recognition.hand is shown
-
-
 @pytest.mark.parametrize("mirrored", [None, PEACE, show_sign(GO)])
 def test_without_colours_the_first_opinion_is_enough_unless_a_fist_is_seen(mirrored: Hand | None) -> None:
     for shown, sign in ((PEACE, FORWARD), (show_sign(GO), GO)):

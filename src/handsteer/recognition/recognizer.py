@@ -241,10 +241,10 @@ class Recognizer:
                 continue
             guess = self._classifier.classify(seen)
             sign = self._seen(guess).sign
-            points = seen is not hand and sign not in (NONE, STOP, GO)
+            points = sign not in (NONE, STOP, GO)
             if points and not (self._seen(classified[index]).sign == NONE and is_grey(image)):
                 other = ask(image, hand, mirrored=True) or hand
-                points = other is not hand and self._seen(self._classifier.classify(other)).sign == sign
+                points = self._seen(self._classifier.classify(other)).sign == sign
             if points:
                 hands[index], classified[index] = seen, guess
             self._opinions.note(has_changed=points)
