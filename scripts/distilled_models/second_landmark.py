@@ -1,8 +1,8 @@
 """Trains the hand landmark model for second opinions, from which ``hand_landmark_second.tflite`` is made.
 
 MediaPipe's landmark model (the teacher) sees hands in colour, as they are and mirrored; a copy of it learns to see the
-same in them without colours, and what the shipped classifier makes of it. In pictures with colours, too, it errs in
-other ones than the teacher. Its size and speed stay as they are.
+same in them without colours, and what the shipped classifier makes of it. With colours, too, it errs in other pictures
+than the teacher does. Its size and speed stay as they are.
 
 Run it with the photos that the tables of docs/signs.md call tuning, in handsteer's environment with PyTorch installed,
 then measure the ranges of the new model's values, and convert it to 8-bit integers as ``make landmark-model`` does::

@@ -35,7 +35,7 @@ def main() -> None:
     pictures = list(crops(options.folders, "choose"))
     source, target = find_model("hand_landmark_full.tflite"), HERE / "ranges.json"
     if options.second:
-        # Its training pictures have no colours either.
+        # It was trained on pictures without colours.
         pictures = [cv2.cvtColor(cv2.cvtColor(each, cv2.COLOR_RGB2GRAY), cv2.COLOR_GRAY2RGB) for each in pictures]
         source, target = options.second, HERE / "ranges_second.json"
     if not pictures:

@@ -100,7 +100,8 @@ class Landmarker(Protocol):
             mirrored: Whether to look at the mirrored image, which may show another shape.
 
         Returns:
-            The other hand, ``hand`` itself without one, or None if this frame has no time for it, nor for the mirrored.
+            The hand as it is seen so; ``hand`` if it does not surely show one; None if this frame has no time for that
+            and the mirrored look.
         """
         ...
 

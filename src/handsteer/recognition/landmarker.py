@@ -168,6 +168,7 @@ class MediaPipeLandmarker:
         index, model = self._index_of(hand), self._second_model
         if index is None or model is None:
             return hand
+        # The mirrored look, which may have to confirm this one, belongs to the same frame.
         if self._runs_left < (1 if mirrored else 2):
             return None
         self._runs_left -= 1
