@@ -16,7 +16,8 @@ from handsteer.recognition.regions import Palm, PalmDetector, Roi
 from handsteer.recognition.search import Pace, PalmView, Places, Search, Stillness, cells_of_frame, cells_of_hands
 from tests.recognition.drawn_hand import draw, open_left_hand, open_right_hand
 
-FRAME = np.zeros((480, 640, 3), np.uint8)
+FRAME = np.full((480, 640, 3), (90, 120, 160), np.uint8)
+GREY = np.full_like(FRAME, 128)
 
 
 class Palms(PalmDetector):
@@ -25,9 +26,11 @@ class Palms(PalmDetector):
     def __init__(self, *palms: Palm) -> None:
         self.palms = list(palms)
         self.views: list[PalmView] = []
+        self.colours: list[list[int]] = []
 
     def detect(self, image: np.ndarray, limit: int, *, widened: float = 1.0, smoothed: bool = False) -> list[Palm]:
         self.views.append(PalmView(widened, smoothed))
+        self.colours.append(image[0, 0].tolist())
         return self.palms[:limit]
 
     @property
@@ -78,6 +81,37 @@ def test_later_frames_without_a_hand_take_one_search_of_palms_each_and_all_ways_
     assert ways == {PLAIN: 3, SMOOTHED: 3, WIDENED: 2, WIDENED_SMOOTHED: 1, MORE_WIDENED: 3}
     assert len({roi.rotation for _, middle in later for roi in middle}) == 4
     assert sum(len(middle) for _, middle in later) == 6
+
+
+def test_palms_are_looked_for_in_a_tinted_copy_of_a_grey_frame_at_last() -> None:
+    palms = Palms()
+    list(Search(palms, 2, wide=True).places(GREY, beside_a_hand=False))
+    assert palms.views == [*ALL_SIZES, MORE_WIDENED] * 2
+    assert palms.colours[:5] == [[128] * 3] * 5
+    ((blue, green, red),) = {tuple(colour) for colour in palms.colours[5:]}
+    assert blue < green < 128 < red
+
+
+def test_later_grey_frames_are_tinted_in_turn() -> None:
+    palms = Palms()
+    search = Search(palms, 2, wide=True)
+    list(search.places(GREY, beside_a_hand=False))
+    palms.views.clear()
+    palms.colours.clear()
+    for _ in range(16):
+        list(search.places(GREY, beside_a_hand=False))
+    four = [PLAIN, WIDENED, SMOOTHED, MORE_WIDENED]
+    assert palms.views == four * 2 + [PLAIN, WIDENED_SMOOTHED, SMOOTHED, MORE_WIDENED] * 2
+    assert [colour == [128] * 3 for colour in palms.colours] == ([True] * 4 + [False] * 4) * 2
+
+
+def test_a_frame_with_colours_and_one_beside_a_hand_are_never_tinted() -> None:
+    for frame, wide, beside_a_hand in ((FRAME, True, False), (GREY, True, True), (GREY, False, False)):
+        palms = Palms()
+        search = Search(palms, 2, wide=wide)
+        for _ in range(20):
+            list(search.places(frame, beside_a_hand=beside_a_hand))
+        assert palms.colours == [frame[0, 0].tolist()] * len(palms.views)
 
 
 def test_a_reset_makes_the_next_frame_the_first() -> None:

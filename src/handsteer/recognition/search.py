@@ -4,19 +4,21 @@ Palms are detected in the plain frame as MediaPipe does. A palm model misses han
 are also detected in a smoothed frame, in which it misses some small hands instead; and hands that nearly fill a frame,
 fists above all, so palms are also detected in a widened frame, where they appear smaller. While there is no hand, palms
 of a low score count too if the landmark model is sure of their hands, and that model is applied to the middle of the
-frame without any palm.
+frame without any palm. The palm model was trained on colours, so in a grey frame, palms are detected in a copy that is
+tinted like skin too.
 """
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, radians
-from typing import Final
+from typing import ClassVar, Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from handsteer.recognition.landmark_models import is_grey
 from handsteer.recognition.regions import Palm, PalmDetector, Roi
 
 _MIDDLE: Final = 0.7
@@ -45,6 +47,8 @@ _RETRIED: Final = 4
 """Maximum number of sure and of doubtful palms that are tried again."""
 _FURTHER: Final = 2
 """Palms beyond the wanted number: one that shows a sign may have a lower score than those of another person."""
+_TINT: Final = (1.25, 1.05, 0.80)
+"""Exponents of grey, 0 to 1, that give the blue, green and red of about the skin of that brightness."""
 
 Cells = NDArray[np.uint8]
 """Mean colours of the cells of a picture, as a small picture; a hand may be as bright as its background."""
@@ -86,11 +90,13 @@ class Palms:
 
     The views are tried in order, until there are enough palms with a high score. Larger regions of palms come last, if
     wanted: they are for palms in whose own the landmark model sees no hand. In a stream, the next frames do as much.
+    Tinted ones are for frames without colours only.
     """
 
     views: tuple[PalmView, ...] = (PalmView(),)
     near: bool = False
     larger: bool = False
+    tinted: bool = False
 
     def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Iterator[Places]:
         """Yield the regions of palms, those of ``limit`` hands and a few more, then those of doubtful palms, if any.
@@ -99,6 +105,7 @@ class Palms:
         hands in its region.
         """
         found: list[tuple[bool, Palm]] = []
+        image = _tinted(image) if self.tinted else image
         for view in self.views:
             if sum(palm.score >= _SURE_PALM for _, palm in found) < limit:
                 seen = palms.detect(image, limit + _FURTHER, widened=view.widened, smoothed=view.smoothed)
@@ -125,6 +132,7 @@ class Middle:
     """Use the middle of the frame, as if the fingers pointed ``turned_deg`` clockwise from up."""
 
     turned_deg: float = 0.0
+    tinted: ClassVar = False
 
     def places(self, image: NDArray[np.uint8], palms: PalmDetector, limit: int) -> Iterator[Places]:
         """Yield the region, with its other rotations as rivals.
@@ -148,12 +156,16 @@ _VERY_WIDE: Final = Palms((PalmView(2.0),), near=True)
 _MIDDLE_UP, *_MIDDLES_TURNED = (Middle(turned_deg) for turned_deg in (0.0, 180.0, 90.0, 270.0))
 
 _AS_MEDIAPIPE: Final[Turn] = (_PLAIN,)
-_FIRST: Final[Turn] = (Palms(_VIEWS, larger=True), _VERY_WIDE, _MIDDLE_UP, *_MIDDLES_TURNED)
+_ALL_SIZES: Final = (Palms(_VIEWS, larger=True), _VERY_WIDE)
+_FIRST: Final[Turn] = (*_ALL_SIZES, _MIDDLE_UP, *_MIDDLES_TURNED, *(replace(way, tinted=True) for way in _ALL_SIZES))
 # Palm detection takes longest, so there is one per frame. Most hands that are shown point upwards.
 _WITHOUT_HANDS: Final[tuple[Turn, ...]] = tuple(
     turn
     for turned, wide in zip(_MIDDLES_TURNED, itertools.cycle((_WIDE, _SMOOTH_WIDE)), strict=False)
-    for turn in ((_PLAIN,), (wide, _MIDDLE_UP), (_SMOOTH,), (_VERY_WIDE, turned))
+    for turn in (
+        *((_PLAIN,), (wide, _MIDDLE_UP), (_SMOOTH,), (_VERY_WIDE, turned)),
+        *((replace(way, tinted=True),) for way in (_PLAIN, wide, _SMOOTH, _VERY_WIDE)),
+    )
 )
 # A tracked hand was usually found in the plain frame, in which a second one would have been found too.
 _BESIDE_A_HAND: Final[tuple[Turn, ...]] = ((_SMOOTH_WIDE,), (_PLAIN,))
@@ -194,12 +206,20 @@ class Search:
         """
         if self._wide and not beside_a_hand:
             self._beside_a_hand = itertools.cycle(_BESIDE_A_HAND)
-        turn = next(self._beside_a_hand if beside_a_hand else self._without_hands)
-        for way in turn:
+        turns = self._beside_a_hand if beside_a_hand else self._without_hands
+        tints = self._wide and is_grey(image)
+        usable = ([way for way in turn if tints or not way.tinted] for turn in turns)
+        for way in next(filter(None, usable)):
             for places in way.places(image, self._palms, self._limit):
                 yield places
                 if beside_a_hand:
                     break
+
+
+def _tinted(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return the grey ``image``, (height, width, 3) uint8, BGR, as if all in it were skin."""
+    levels = np.arange(256)[:, None] / 255
+    return np.asarray(cv2.LUT(image, np.rint(255 * levels**_TINT).astype(np.uint8)[None]), np.uint8)
 
 
 @dataclass(frozen=True)
