@@ -158,7 +158,8 @@ _MIDDLE_UP, *_MIDDLES_TURNED = (Middle(turned_deg) for turned_deg in (0.0, 180.0
 _AS_MEDIAPIPE: Final[Turn] = (_PLAIN,)
 _ALL_SIZES: Final = (Palms(_VIEWS, larger=True), _VERY_WIDE)
 _FIRST: Final[Turn] = (*_ALL_SIZES, _MIDDLE_UP, *_MIDDLES_TURNED, *(replace(way, tinted=True) for way in _ALL_SIZES))
-# Palm detection takes longest, so there is one per frame. Most hands that are shown point upwards.
+# Palm detection takes longest, so there is one per frame. Most hands that are shown point upwards. With colours, the
+# turns that consist of tinted ways only are left out.
 _WITHOUT_HANDS: Final[tuple[Turn, ...]] = tuple(
     turn
     for turned, wide in zip(_MIDDLES_TURNED, itertools.cycle((_WIDE, _SMOOTH_WIDE)), strict=False)
@@ -207,8 +208,8 @@ class Search:
         if self._wide and not beside_a_hand:
             self._beside_a_hand = itertools.cycle(_BESIDE_A_HAND)
         turns = self._beside_a_hand if beside_a_hand else self._without_hands
-        tints = self._wide and is_grey(image)
-        usable = ([way for way in turn if tints or not way.tinted] for turn in turns)
+        has_no_colours = is_grey(image)
+        usable = ([way for way in turn if has_no_colours or not way.tinted] for turn in turns)
         for way in next(filter(None, usable)):
             for places in way.places(image, self._palms, self._limit):
                 yield places
