@@ -77,7 +77,8 @@ def _tutorial() -> Step:
 def _handsteer(*, drawing: bool) -> Step:
     import cv2  # noqa: PLC0415
 
-    from handsteer.recognition.recognizer import Recognizer, annotate  # noqa: PLC0415
+    from handsteer.recognition.drawing import annotate  # noqa: PLC0415
+    from handsteer.recognition.recognizer import Recognizer  # noqa: PLC0415
 
     cv2.setNumThreads(1)
     recognizer = Recognizer()

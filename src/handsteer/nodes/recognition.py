@@ -46,9 +46,10 @@ from handsteer.nodes.timing import (
     far_and_late,
 )
 from handsteer.pipeline import FramePipeline
+from handsteer.recognition.drawing import annotate
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.profile import profile_path
-from handsteer.recognition.recognizer import Recognition, Recognizer, annotate, open_classifier
+from handsteer.recognition.recognizer import Recognition, Recognizer, open_classifier
 from handsteer.timeouts import PLAYED_S
 from handsteer.transports.base import Received, Subscription, Transport
 from handsteer.types import NONE, RELEASED, Handedness

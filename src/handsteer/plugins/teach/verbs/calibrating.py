@@ -26,9 +26,10 @@ from handsteer.plugins.teach.evaluation.labels import read_photo_labels
 from handsteer.plugins.teach.evaluation.views import View
 from handsteer.plugins.teach.terminal import Keys, TerminalPicture
 from handsteer.plugins.teach.verbs.calibrate import Timing
+from handsteer.recognition.drawing import draw_hand
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.profile import profile_path
-from handsteer.recognition.recognizer import draw_hand, open_landmarker
+from handsteer.recognition.recognizer import open_landmarker
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
 from handsteer.types import NONE, SIGNS
 

@@ -20,8 +20,9 @@ from handsteer.plugins.teach.dataset import Dataset, add_takes, load_dataset, sa
 from handsteer.plugins.teach.terminal import Keys, TerminalPicture
 from handsteer.plugins.teach.verbs.tables import dataset_table
 from handsteer.recognition.custom_signs import label_for
+from handsteer.recognition.drawing import draw_hand
 from handsteer.recognition.hand import Hand
-from handsteer.recognition.recognizer import draw_hand, open_landmarker
+from handsteer.recognition.recognizer import open_landmarker
 
 _AROUND_S = 0.25
 
