@@ -184,7 +184,9 @@ class Breaks:
 """
 
 
-@pytest.mark.parametrize("body", ["raise ValueError('broken')", "return None", "return type(now)(float('nan'), 1.0)"])
+@pytest.mark.parametrize(
+    "body", ["raise ValueError('broken')", "raise SystemExit", "return None", "return type(now)(float('nan'), 1.0)"]
+)
 def test_an_action_that_fails_stops_the_robot(
     installed: Installed, body: str, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -264,6 +266,7 @@ def test_the_example_passes_the_contract_of_robots(tmp_path: Path) -> None:
     [
         ("import nothing_of_this_name", "ModuleNotFoundError: No module named 'nothing_of_this_name'"),
         ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
+        ("raise SystemExit(0)", "SystemExit: 0"),
         ("", "AttributeError: module 'broken"),
     ],
 )
@@ -272,6 +275,61 @@ def test_what_cannot_be_loaded_is_reported_with_its_distribution(installed: Inst
     installed.add(name, code, robots="broken = Robot")
     with pytest.raises(PluginError, match=rf"^the robot broken of {name} cannot be loaded: {reason}"):
         doors.ROBOTS.load("broken")
+
+
+def test_what_is_opened_is_what_the_door_is_for(installed: Installed) -> None:
+    code = "class Half:\n    def __init__(self, *_): pass\n    def step(self): pass\n    def close(self): pass\n"
+    installed.add("halves", f"{code}def nothing(*_): pass\n", robots="half = Half", cameras="none = nothing")
+    lacks = "description, command, obstacles, scan, commanders"
+    with pytest.raises(PluginError, match=f"^the robot half of halves is of type Half without {lacks}$"):
+        doors.ROBOTS.open("half", Config(), SteppedClock())
+    with pytest.raises(PluginError, match=r"^the camera none of halves is of type NoneType without name, period_s,"):
+        doors.CAMERAS.open("none", Config(), SteppedClock())
+
+
+def test_what_exits_while_it_is_opened_is_reported(installed: Installed) -> None:
+    installed.add("leaving", "import sys\ndef leave(*_): sys.exit(0)\n", robots="leaves = leave")
+    with pytest.raises(PluginError, match=r"^the robot leaves of leaving cannot be opened: SystemExit: 0$"):
+        doors.ROBOTS.open("leaves", Config(), SteppedClock())
+
+
+@pytest.mark.parametrize("period", ["float('nan')", "-1", "0", "'30'", "float('inf')"])
+def test_a_camera_with_another_period_is_refused(installed: Installed, period: str) -> None:
+    from handsteer.cameras.choose import open_camera  # noqa: PLC0415
+
+    code = f"class Odd:\n    name, period_s, read = 'odd', {period}, None\n    def __init__(self, *_): pass\n"
+    installed.add("odd", f"{code}    def close(self): pass\n", cameras="odd = Odd")
+    config = Config.model_validate({"camera": {"source": "odd"}})
+    with pytest.raises(
+        PluginError, match=r"^the camera odd of odd cannot be used: its period_s is .*, not a number of"
+    ):
+        open_camera(config, SteppedClock())
+
+
+@pytest.mark.slow
+def test_verbs_that_cannot_be_used_are_left_out_of_the_help(installed: Installed) -> None:
+    installed.add("leaving", "raise SystemExit(0)", verbs="leave = leave")
+    installed.add("failing", "raise RuntimeError('no licence')", verbs="fail = fail")
+    installed.add("number", "five = 5", verbs="five = five")
+    installed.add("greeting", example("Verb"), verbs="greet = greet")
+    said = {
+        "leave": "handsteer: the verb leave of leaving cannot be loaded: SystemExit: 0",
+        "fail": "handsteer: the verb fail of failing cannot be loaded: RuntimeError: no licence",
+        "five": "handsteer: the verb five of number is of type int, not a function or an app",
+    }
+    for words in (("--help",), ("completion", "bash")):
+        done = installed.run(*words)
+        assert "greet" in done.stdout
+        assert done.stderr.splitlines() == [f"{line}; it is left out" for _, line in sorted(said.items())]
+    for verb, line in said.items():
+        assert installed.run(verb, code=2).stderr == f"{line}\n"
+
+
+@pytest.mark.slow
+def test_a_verb_returns_an_exit_code_or_nothing(installed: Installed) -> None:
+    installed.add("talking", "def talk(): return 'hello'\ndef count() -> int: return 3\n", verbs="talk = talk")
+    error = installed.run("talk", code=2).stderr
+    assert error == "handsteer: a verb should return an exit code or None, and talking returned 'hello'\n"
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final, Generic, ParamSpec, Protocol, TypeVar
 
-from handsteer.errors import HandsteerError, PluginError, did_you_mean
+from handsteer.errors import PLUGIN_FAILURES, HandsteerError, PluginError, did_you_mean
 
 if TYPE_CHECKING:
     from handsteer.cameras import Camera
@@ -80,11 +80,13 @@ class Door(Generic[T]):
     Args:
         group: Its name, such as ``handsteer.robots``.
         what: What comes in, for messages, such as ``robot``.
+        needs: Attributes without which something that is opened is not one.
     """
 
-    def __init__(self, group: str, what: str) -> None:
+    def __init__(self, group: str, what: str, needs: Sequence[str] = ()) -> None:
         self.group = group
         self._what = what
+        self._needs = needs
 
     def names(self) -> tuple[str, ...]:
         """Return the names of what is installed, our own first."""
@@ -107,7 +109,7 @@ class Door(Generic[T]):
         entry = self._entry(name)
         try:
             found: T = entry.load()
-        except Exception as error:  # whatever the code of others raises while it is imported
+        except PLUGIN_FAILURES as error:
             raise self._failed(name, "loaded", error) from error
         return found
 
@@ -115,24 +117,31 @@ class Door(Generic[T]):
         """Return what the function of this name makes of its arguments.
 
         Raises:
-            PluginError: There is none, or it cannot be loaded or opened.
+            PluginError: There is none, it cannot be loaded or opened, or lacks what it needs.
             HandsteerError: It says itself, by one, why it cannot be opened.
         """
         make = self.load(name)
         try:
-            return make(*arguments, **options)
+            made = make(*arguments, **options)
         except HandsteerError:
             raise
-        except Exception as error:
+        except PLUGIN_FAILURES as error:
             dist = self._entry(name).dist
             if dist is not None and dist.name == _OURS:
                 raise
             raise self._failed(name, "opened", error) from error
+        missing = [need for need in self._needs if not hasattr(made, need)]
+        if missing:
+            raise PluginError(f"{self.described(name)} is of type {type(made).__name__} without {', '.join(missing)}")
+        return made
 
-    def _failed(self, name: str, done: str, error: Exception) -> PluginError:
+    def described(self, name: str) -> str:
+        """Return what is of this name, with its distribution, for messages."""
         entry = self._entry(name)
-        package = entry.dist.name if entry.dist else "an unknown distribution"
-        return PluginError(f"the {self._what} {name} of {package} cannot be {done}: {type(error).__name__}: {error}")
+        return f"the {self._what} {name} of {entry.dist.name if entry.dist else 'an unknown distribution'}"
+
+    def _failed(self, name: str, done: str, error: BaseException) -> PluginError:
+        return PluginError(f"{self.described(name)} cannot be {done}: {type(error).__name__}: {error}")
 
     def _entry(self, name: str) -> importlib.metadata.EntryPoint:
         entries = _entries(self.group)
@@ -173,16 +182,22 @@ def _entries(group: str) -> dict[str, importlib.metadata.EntryPoint]:
     return entries
 
 
-CAMERAS: Final[Door[Callable[["Config", "Clock"], "Camera"]]] = Door("handsteer.cameras", "camera")
+CAMERAS: Final[Door[Callable[["Config", "Clock"], "Camera"]]] = Door(
+    "handsteer.cameras", "camera", ("name", "period_s", "read", "close")
+)
 """Open a camera; ``camera.source`` is its name."""
 
-ROBOTS: Final[Door[Callable[["Config", "Clock"], "Robot"]]] = Door("handsteer.robots", "robot")
+ROBOTS: Final[Door[Callable[["Config", "Clock"], "Robot"]]] = Door(
+    "handsteer.robots", "robot", ("description", "command", "step", "obstacles", "scan", "commanders", "close")
+)
 """Open a robot; ``robot.kind`` is its name."""
 
 TRANSPORTS: Final[Door[Callable[[str, Sequence[str]], "Session"]]] = Door("handsteer.transports", "transport")
 """Join a graph of several processes, as a node of a name, with arguments in the syntax of the transport."""
 
-CLASSIFIERS: Final[Door[Callable[["SignsConfig"], "Classifier"]]] = Door("handsteer.classifiers", "classifier")
+CLASSIFIERS: Final[Door[Callable[["SignsConfig"], "Classifier"]]] = Door(
+    "handsteer.classifiers", "classifier", ("signs", "classify", "confidence")
+)
 """Open a classifier of hands; ``signs.classifier`` is its name."""
 
 ACTIONS: Final[Door[type[SignAction]]] = Door("handsteer.actions", "action")

@@ -117,6 +117,10 @@ class PluginError(HandsteerError):
     """A plug-in is not installed, or cannot be loaded."""
 
 
+PLUGIN_FAILURES: Final = (Exception, SystemExit)
+"""What the code of a plug-in may raise: one that calls ``sys.exit`` must not end handsteer as if all was well."""
+
+
 class PackageMissing(HandsteerError):  # noqa: N818
     """A Python package that is needed is not installed."""
 

@@ -198,5 +198,7 @@ def test_an_assist_that_cannot_be_made_is_refused(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(doors.ASSISTS, "load", lambda name: Broken)
     bench = MonitorBench(CollisionMonitorConfig())
-    with pytest.raises(ConfigError, match=r"control\.assist: the assist steer cannot be made: ValueError: no scanner"):
+    with pytest.raises(
+        ConfigError, match=r"control\.assist: the assist steer of handsteer cannot be made: ValueError: no scanner"
+    ):
         bench.control.check(Config(control=STEER))

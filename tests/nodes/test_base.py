@@ -128,6 +128,25 @@ def test_the_thread_sleeps_until_there_is_work_and_ends_at_stop() -> None:
     assert not any(thread.name == "node" for thread in threading.enumerate())
 
 
+def test_a_callback_that_exits_has_failed_and_the_thread_goes_on() -> None:
+    transport, called = InProcessTransport(), threading.Semaphore(0)
+    node = Node("node", transport, RealClock())
+    topic = Topic("/number", int)
+
+    def leave(_: Received[int]) -> None:
+        called.release()
+        raise SystemExit(0)
+
+    node.subscribe(topic, leave)
+    node.start()
+    numbers = transport.advertise("other", topic)
+    for _ in range(2):
+        numbers.publish(1)
+        assert called.acquire(timeout=5)
+    node.stop()
+    assert node.callback_errors == 2
+
+
 def test_on_stop_is_called_even_when_it_raises() -> None:
     class Bad(Node):
         def on_stop(self) -> None:

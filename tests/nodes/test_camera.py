@@ -1,8 +1,10 @@
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from handsteer.cameras import Frame
 from handsteer.cameras.choose import uncalibrated
 from handsteer.clock import SteppedClock, to_seconds
 from handsteer.config import Config
@@ -137,6 +139,31 @@ def test_a_camera_that_fails_in_a_way_of_its_own_is_tried_again_with_pauses_too(
     assert len(images) == 3
     assert caplog.text.count("Traceback") == 1
     assert node.callback_errors == 0
+
+
+def test_a_camera_that_exits_has_failed() -> None:
+    bench, node, _ = start(ONE, SystemExit(0), SystemExit(0), TWO)
+    images, diagnostics = bench.record(IMAGE_RAW), bench.record(DIAGNOSTICS)
+    bench.run(1.0)
+    assert diagnostics[-1].status[0].message == "faulty camera has failed: SystemExit: 0"
+    bench.run(2.0)
+    assert (len(images), node.frames) == (2, 2)
+
+
+@pytest.mark.parametrize(
+    "odd", ["a text", Frame(np.zeros((0, 0, 3), np.uint8), 0.0), Frame(ONE, math.nan)], ids=["text", "empty", "nan"]
+)
+def test_a_frame_that_cannot_be_published_is_a_failure_of_the_camera(
+    odd: object, caplog: pytest.LogCaptureFixture
+) -> None:
+    bench, node, _ = start(ONE, *[odd] * 2, TWO)  # type: ignore[arg-type]
+    images, diagnostics = bench.record(IMAGE_RAW), bench.record(DIAGNOSTICS)
+    bench.run(1.0)
+    assert diagnostics[-1].status[0].message.startswith("faulty camera has failed: ")
+    assert caplog.text.count("faulty camera is back") == 0
+    bench.run(2.0)
+    assert (len(images), node.frames, node.callback_errors) == (2, 2, 0)
+    assert caplog.text.count("Traceback") == caplog.text.count("faulty camera is back") == 1
 
 
 def test_a_camera_that_returns_no_frame_at_once_is_not_asked_without_pause() -> None:

@@ -1,10 +1,11 @@
 import re
-from typing import ClassVar
+import threading
+from typing import Any, ClassVar
 
 import pytest
 
 from handsteer.config import Config, RobotConfig
-from handsteer.errors import WorldError
+from handsteer.errors import PluginError, WorldError
 from handsteer.making import open_robot
 from handsteer.messages import (
     CLOCK,
@@ -52,6 +53,30 @@ class RobotBench(Bench):
     @property
     def newest(self) -> Odometry:
         return self.odometry[-1]
+
+
+def test_a_robot_that_does_not_close_keeps_nothing_running(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    bench = Bench()
+    robot, closed = open_robot(Config(robot=RobotConfig(world="empty")), bench.clock), threading.Event()
+    node = RobotNode(bench.transport, bench.clock, robot, RobotConfig(world="empty"))
+    monkeypatch.setattr("handsteer.nodes.robot._LONGEST_END_S", 0.01)
+    monkeypatch.setattr(robot, "close", closed.wait)
+    node.stop()
+    assert "the robot was not closed within 0.01 s: it may not have stopped" in caplog.text
+    closed.set()
+
+
+@pytest.mark.parametrize(("code", "said"), [("return None", "gave None, not a"), ("raise SystemExit(0)", "raised Sys")])
+def test_a_robot_without_a_first_state_is_refused(code: str, said: str) -> None:
+    bench = Bench()
+    robot = open_robot(Config(robot=RobotConfig(world="empty")), bench.clock)
+    scope: dict[str, Any] = {}
+    exec(f"def step(dt_s):\n    {code}", scope)
+    robot.step = scope["step"]  # type: ignore[method-assign]
+    with pytest.raises(PluginError, match=f"^the first step of the robot SimulatedRobot {said}"):
+        RobotNode(bench.transport, bench.clock, robot, RobotConfig(world="empty"))
 
 
 def test_a_robot_that_fails_at_its_last_zero_is_closed_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 """Finds this machine's cameras, opens the one that a source names, and reads its calibration."""
 
 import logging
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from handsteer.cameras.files import PHOTO_SUFFIXES, PhotoFolder, VideoFile, is_r
 from handsteer.cameras.webcam import Webcam, device_path, is_address, is_device, name_of, webcams
 from handsteer.clock import Clock
 from handsteer.config import CameraConfig, Config
-from handsteer.errors import CameraError, CameraNotFound, quoted
+from handsteer.errors import CameraError, CameraNotFound, PluginError, quoted
 from handsteer.messages import NO_STAMP, CameraInfo, Header, RegionOfInterest
 
 log = logging.getLogger(__name__)
@@ -52,7 +53,7 @@ def open_camera(config: Config, clock: Clock, *, may_be_real: bool = False) -> C
     if source == "browser":
         raise CameraNotFound("the browser's camera needs the page: handsteer run --camera browser")
     if source in doors.CAMERAS.names():
-        return doors.CAMERAS.open(source, config, clock)
+        return _plug_in(source, config, clock)
     if is_device(source) or is_address(source):
         return _webcam(source, config.camera, clock)
     path = Path(source).expanduser()
@@ -75,6 +76,16 @@ def _first_webcam(config: CameraConfig, clock: Clock) -> Camera | None:
 
 def _webcam(source: str, config: CameraConfig, clock: Clock) -> Camera:
     return Webcam(source, clock, width=config.width, height=config.height, fps=config.fps)
+
+
+def _plug_in(name: str, config: Config, clock: Clock) -> Camera:
+    camera = doors.CAMERAS.open(name, config, clock)
+    period_s: object = camera.period_s
+    if period_s is None or (isinstance(period_s, int | float) and 0 < period_s < math.inf):
+        return camera
+    camera.close()
+    reason = f"its period_s is {period_s!r}, not a number of seconds above 0 or None"
+    raise PluginError(f"{doors.CAMERAS.described(name)} cannot be used: {reason}")
 
 
 def _file(path: Path, config: CameraConfig, clock: Clock) -> Camera:

@@ -27,8 +27,8 @@ from cyclopts import (
 from handsteer import __version__
 from handsteer.cli import signals
 from handsteer.cli.options import take_parameters, with_section
-from handsteer.cli.running import exit_code, fail, set_up_logging
-from handsteer.errors import did_you_mean
+from handsteer.cli.running import exit_code, fail, say, set_up_logging
+from handsteer.errors import PluginError, did_you_mean, quoted
 
 _WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
 
@@ -138,6 +138,32 @@ def add_plugin_verbs() -> None:
                 _OF_OTHERS.add(verb)
 
 
+def load_verbs_of_others() -> None:
+    """Load the verbs of plug-ins; those that cannot be loaded are left out of :data:`app`, with a line for each."""
+    for verb in sorted(_OF_OTHERS):
+        try:
+            _load_verb(verb)
+        except PluginError as error:
+            say(" ".join(f"{error}; it is left out".split()))
+            _OF_OTHERS.remove(verb)
+            del app[verb]
+
+
+def _load_verb(verb: str) -> None:
+    """Load a verb of a plug-in.
+
+    Raises:
+        PluginError: It cannot be loaded or called.
+    """
+    # It looks for parameters of plug-ins, which may be in the module of a verb: that must not be half loaded then.
+    importlib.import_module("handsteer.config")
+    from handsteer import doors
+
+    found = doors.VERBS.load(verb)
+    if not callable(found):
+        raise PluginError(f"{doors.VERBS.described(verb)} is of type {type(found).__name__}, not a function or an app")
+
+
 def loads(*modules: str) -> Callable[[V], V]:
     """Declare the modules that a verb works with; they are imported before signals can interrupt an import."""
 
@@ -154,10 +180,6 @@ def run(words: list[str]) -> int:
     # To search what is installed takes a tenth of the time to load this.
     if not words or words[0] not in set(app) - set(app.help_flags):
         add_plugin_verbs()
-    if words and words[0] in _OF_OTHERS:
-        # It looks for parameters of plug-ins, which may be in the module of a verb: that must not be half loaded then.
-        importlib.import_module("handsteer.config")
-    _load_what_help_lists(app, words)
     return exit_code(lambda: _run(words))
 
 
@@ -167,6 +189,11 @@ def _is_of_cyclopts(verb: Callable[..., object]) -> bool:
 
 
 def _run(words: list[str]) -> int:
+    if not words or words[0] in app.help_flags:
+        load_verbs_of_others()
+    elif words[0] in _OF_OTHERS:
+        _load_verb(words[0])
+    _load_what_help_lists(app, words)
     own, parameters = take_parameters(_ros_words_last(words))
     try:
         verb, given, unparsed = app.parse_args(own, exit_on_error=False, print_error=False)
@@ -185,7 +212,10 @@ def _run(words: list[str]) -> int:
     gc.enable()
     # The verb is loaded; from here on, an interrupt must clean up what it started.
     signals.interrupt_on_signals()
-    return int(verb(*given.args, **given.kwargs) or 0)
+    code = verb(*given.args, **given.kwargs)
+    if not isinstance(code, int | None):
+        raise PluginError(f"a verb should return an exit code or None, and {verb.__module__} returned {quoted(code)}")
+    return code or 0
 
 
 def _load_what_help_lists(group: App, arguments: list[str]) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from handsteer.cli.app import add_plugin_verbs, app, loads
+from handsteer.cli.app import add_plugin_verbs, app, load_verbs_of_others, loads
 from handsteer.cli.running import say
 from handsteer.errors import ModelMissing
 
@@ -97,6 +97,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
         The shell; the script works without starting Python.
     """
     add_plugin_verbs()
+    load_verbs_of_others()
     print(_listing(app, list(_parameters())).generate_completion(shell=shell))
     return 0
 

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Iterable
 
 from handsteer import doors
-from handsteer.errors import PluginError
+from handsteer.errors import PLUGIN_FAILURES, PluginError
 from handsteer.types import ACTIONS, ZERO, Velocity
 
 log = logging.getLogger(__name__)
@@ -15,7 +15,7 @@ class AddedActions:
 
     def __init__(self) -> None:
         self._made: dict[str, doors.SignAction] = {}
-        self._failed: set[tuple[str, type[Exception]]] = set()
+        self._failed: set[tuple[str, type[BaseException]]] = set()
 
     def make(self, actions: Iterable[str]) -> None:
         """Make those of ``actions`` that are new here and not built in; they are kept from then on.
@@ -27,9 +27,9 @@ class AddedActions:
             make = doors.ACTIONS.load(name)
             try:
                 self._made[name] = make()
-            except Exception as error:
+            except PLUGIN_FAILURES as error:
                 reason = f"{type(error).__name__}: {error}"
-                raise PluginError(f"the action {name} cannot be made: {reason}") from error
+                raise PluginError(f"{doors.ACTIONS.described(name)} cannot be made: {reason}") from error
 
     def velocity(self, name: str, now: Velocity, since_last_s: float) -> Velocity:
         """Return the velocity that the action ``name`` wants; zero if it fails, which is logged once for each cause.
@@ -39,7 +39,7 @@ class AddedActions:
         try:
             wanted = self._made[name].velocity(now, since_last_s)
             return wanted if wanted.is_finite else ZERO
-        except Exception as error:
+        except PLUGIN_FAILURES as error:
             if (name, type(error)) not in self._failed:
                 self._failed.add((name, type(error)))
                 log.exception("the action %s has failed: the robot stops", name)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from handsteer import doors
 from handsteer.config import CollisionMonitorConfig
 from handsteer.control.footprint import Points
-from handsteer.errors import PluginError
+from handsteer.errors import PLUGIN_FAILURES, PluginError
 from handsteer.types import Velocity
 
 if TYPE_CHECKING:
@@ -54,8 +54,8 @@ def assist_named(name: str) -> "doors.Assist | None":
     make = doors.ASSISTS.load(name)
     try:
         return make()
-    except Exception as error:
-        raise PluginError(f"the assist {name} cannot be made: {type(error).__name__}: {error}") from error
+    except PLUGIN_FAILURES as error:
+        raise PluginError(f"{doors.ASSISTS.described(name)} cannot be made: {type(error).__name__}: {error}") from error
 
 
 def is_within(assisted: Velocity, wanted: Velocity, max_angular_radps: float) -> bool:
@@ -84,7 +84,7 @@ def assisted(assist: doors.Assist, wanted: Velocity, around: Around) -> "tuple[V
         if is_within(velocity, wanted, around.max_angular_radps):
             return velocity, avoided
         log.error("the assist may not make %s of %s: it is left out", velocity, wanted)
-    except Exception:
+    except PLUGIN_FAILURES:
         log.exception("the assist has failed: it is left out")
     return wanted, None
 

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from handsteer.clock import Clock
 from handsteer.config import Config
+from handsteer.errors import PLUGIN_FAILURES
 from handsteer.messages import AUDIT, DIAGNOSTICS, Topic
 from handsteer.nodes.auditing import Auditor
 from handsteer.nodes.callbacks import FailureLog, Inbox, Queue, Timer
@@ -312,6 +313,6 @@ class Node:
     def _guard(self, source: str, callback: Callable[..., None], *args: object) -> None:
         try:
             callback(*args)
-        except Exception as error:
+        except PLUGIN_FAILURES as error:
             self.callback_errors += 1
             self._failures.add(source, error, self.clock.now())

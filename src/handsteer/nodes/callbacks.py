@@ -135,9 +135,9 @@ class FailureLog:
 
     def __init__(self, node: str) -> None:
         self._node = node
-        self._failures: dict[tuple[str, type[Exception]], _Failure] = {}
+        self._failures: dict[tuple[str, type[BaseException]], _Failure] = {}
 
-    def add(self, source: str, error: Exception, now_s: float) -> None:
+    def add(self, source: str, error: BaseException, now_s: float) -> None:
         """Record that the callback of ``source`` has raised ``error`` at ``now_s``."""
         failure = self._failures.setdefault((source, type(error)), _Failure())
         failure.count += 1

@@ -8,7 +8,7 @@ from handsteer.cameras.choose import uncalibrated
 from handsteer.cameras.freshness import Freshness
 from handsteer.clock import Clock
 from handsteer.config import Config
-from handsteer.errors import CameraError, CameraLost
+from handsteer.errors import PLUGIN_FAILURES, CameraError, CameraLost
 from handsteer.images import camera_jpeg_message, image_message, jpeg_message
 from handsteer.messages import (
     CAMERA_INFO,
@@ -105,22 +105,23 @@ class CameraNode(Node):
         if self.ended.is_set():
             return
         try:
-            frame = self._camera.read()
+            self._take(self._camera.read())
         except EndOfStream:
             self.ended.set()
             self._reading.delay_until(self.clock.now() + _LONGEST_RETRY_S)
         except CameraError as error:
             self._lose(error)
-        except Exception as error:  # of a plug-in
+        except PLUGIN_FAILURES as error:
             if self._retry_s == _FIRST_RETRY_S:
                 log.exception("%s has failed", self._camera.name)
             self._lose(CameraLost(f"{self._camera.name} has failed: {type(error).__name__}: {error}"))
-        else:
-            self._follow_choice()
-            if frame is None and not self.is_paced:
-                self._reading.delay_until(self.clock.now() + _NO_FRAME_S)
-            elif frame is not None and self._is_new(frame):
-                self._publish(frame)
+
+    def _take(self, frame: Frame | None) -> None:
+        self._follow_choice()
+        if frame is None and not self.is_paced:
+            self._reading.delay_until(self.clock.now() + _NO_FRAME_S)
+        elif frame is not None and self._is_new(frame):
+            self._publish(frame)
 
     def _follow_choice(self) -> None:
         """Keep the pace of the selected camera, and report on it."""
@@ -131,18 +132,19 @@ class CameraNode(Node):
             self._last_read_s = self.clock.now()
 
     def _publish(self, frame: Frame) -> None:
-        if self._retry_s > _FIRST_RETRY_S or self._is_frozen:
-            log.warning("%s is back", self._camera.name)
-        self._retry_s = _FIRST_RETRY_S
-        self._is_frozen = False
-        self.frames += 1
-        self._status = CameraStatus(self._camera.name, "delivers")
         header = Header(stamp=self.clock.stamp(frame.captured_s), frame_id=self._frame_id)
         self._image.publish(image_message(frame.image, header), frame.captured_s)
         if self._compressed.has_subscribers:
             self._compressed.publish(_compressed(frame, header), frame.captured_s)
         if self._info.has_subscribers:
             self._info.publish(replace(self._info_for(frame), header=header), frame.captured_s)
+        # Last: a plug-in's frame may not be usable.
+        if self._retry_s > _FIRST_RETRY_S or self._is_frozen:
+            log.warning("%s is back", self._camera.name)
+        self._retry_s = _FIRST_RETRY_S
+        self._is_frozen = False
+        self.frames += 1
+        self._status = CameraStatus(self._camera.name, "delivers")
 
     def _info_for(self, frame: Frame) -> CameraInfo:
         """Return the calibration, or that of an uncalibrated camera if its camera or size is not the picture's."""

@@ -2,12 +2,14 @@
 
 import logging
 import math
+import threading
 from typing import Any
 
 import numpy as np
 
 from handsteer.clock import Clock
 from handsteer.config import RobotConfig
+from handsteer.errors import PluginError, quoted
 from handsteer.messages import (
     CLOCK,
     CMD_VEL,
@@ -57,6 +59,8 @@ _DIAGNOSE_PERIOD_S = 0.1
 _LONGEST_STEP_S = 0.1
 # No robot moves so far within a period: it was moved by hand, or its odometry was reset.
 _LEAP_M = 0.5
+_LONGEST_END_S = 5.0
+"""How long a robot may take to stop and to close."""
 
 # Variances of x, y, z, roll, pitch and yaw, in m² and rad²: wheels measure only the motion in the plane.
 _COVARIANCE = np.diag([0.001, 0.001, 1e6, 1e6, 1e6, 0.01]).reshape(-1)
@@ -96,7 +100,7 @@ class RobotNode(Node):
         self._stall_guard = StallGuard(config.cmd_vel_timeout, clock.now())
         self._command = ZERO
         self._commanded_s = clock.now()
-        self.state = robot.step(0.0)
+        self.state = _first_state(robot)
         self.path_length_m = 0.0
         self.was_located = self.state.located
         StopKeeper(self)
@@ -121,7 +125,14 @@ class RobotNode(Node):
         return self.surroundings.services()
 
     def on_stop(self) -> None:
-        """Stop the robot, and close it even if it fails at that."""
+        """Stop the robot, and close it even if it fails at that; one that does not return must not keep us running."""
+        end = threading.Thread(target=self._guard, args=("stop", self._end_robot), name="end of robot", daemon=True)
+        end.start()
+        end.join(_LONGEST_END_S)
+        if end.is_alive():
+            log.error("the robot was not closed within %g s: it may not have stopped", _LONGEST_END_S)
+
+    def _end_robot(self) -> None:
         try:
             self._robot.command(0.0, 0.0)
         finally:
@@ -205,6 +216,21 @@ class RobotNode(Node):
             touches=state.contacts,
             no_command_s=round(silence_s, 1) if is_expired else None,
         )
+
+
+def _first_state(robot: Robot) -> RobotState:
+    """Return the state of the robot as it was opened.
+
+    Raises:
+        PluginError: It gives none.
+    """
+    try:
+        state: object = robot.step(0.0)
+    except SystemExit as error:
+        raise PluginError(f"the first step of the robot {type(robot).__name__} raised SystemExit: {error}") from error
+    if not isinstance(state, RobotState):
+        raise PluginError(f"the first step of the robot {type(robot).__name__} gave {quoted(state)}, not a RobotState")
+    return state
 
 
 def _distance_m(before: RobotState, after: RobotState) -> float:

@@ -10,7 +10,7 @@ from handsteer.cameras import Camera, EndOfStream, Frame
 from handsteer.clock import Clock
 from handsteer.errors import CameraLost
 
-Event = NDArray[np.uint8] | Exception | None
+Event = NDArray[np.uint8] | Frame | BaseException | None
 CameraFault = Literal["black", "frozen", "torn", "slow", "stuttering", "silent", "vanishing", "in_the_future", "late"]
 
 CAMERA_FAULTS: tuple[CameraFault, ...] = get_args(CameraFault)
@@ -23,7 +23,7 @@ class FaultyCamera:
     """Plays a list of events, one per read; after the last one its stream ends.
 
     Args:
-        events: An image (height, width, 3) uint8 is a frame, None is not a frame, an error is raised.
+        events: An image (height, width, 3) uint8 is a frame; an error is raised; a Frame or None is returned.
         clock: Stamps the frames.
         period_s: Time between two frames.
         age_s: Age of each frame when it is read, in seconds.
@@ -41,9 +41,9 @@ class FaultyCamera:
     def read(self) -> Frame | None:
         """Return or raise the next event."""
         for event in self._events:
-            if isinstance(event, Exception):
+            if isinstance(event, BaseException):
                 raise event
-            return None if event is None else Frame(event, self._clock.now() - self._age_s)
+            return Frame(event, self._clock.now() - self._age_s) if isinstance(event, np.ndarray) else event
         raise EndOfStream
 
     def close(self) -> None:
