@@ -164,8 +164,10 @@ class SimulatedClock:
 
     When the simulator's time stops, the stamps stop too, but this clock continues in real seconds: watchdogs must still
     expire, and frames stamped with the stopped time must become stale. When the simulator's time continues, this clock
-    continues from where it is; it never goes back. When the time restarts at an earlier one, the world is another: this
-    clock continues a second later, so that everything from before has expired.
+    continues from where it is; it never goes back. A time up to a second before the last one is ignored: it was
+    overtaken on the way, or the simulator's time runs backwards, which is as if it had stopped. When the time restarts
+    at an earlier one, the world is another: this clock continues a second later, so that everything from before has
+    expired.
 
     Args:
         real: Returns real, monotonic seconds.
@@ -194,7 +196,7 @@ class SimulatedClock:
     def tell(self, time_s: float) -> None:
         """Set the simulator's current time to ``time_s`` seconds."""
         with self._lock:
-            if time_s == self._told_s:
+            if 0 <= self._told_s - time_s <= _LEAST_SET_S:
                 return  # the simulator is paused
             now = self._now()
             if time_s + self._offset_s < now:
