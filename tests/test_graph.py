@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from handsteer.clock import SteppedClock
-from handsteer.config import CameraConfig, Config, ControlConfig, RobotConfig, VirtualHandConfig
+from handsteer.config import CameraConfig, Config, ControlConfig, RobotConfig, SignsConfig, VirtualHandConfig
 from handsteer.errors import ConfigError
 from handsteer.graph import Graph
 from handsteer.messages import AUDIT, CMD_VEL, HAND_SIGN, ODOM, TF, Log, Topic
@@ -172,3 +172,21 @@ def test_changed_parameters_are_in_the_audit_with_who_changed_them() -> None:
         "changed control.linear_step from 0.01 to 0.02",
         "changed control.max_linear from 1 to 0.3",
     ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", [{"min_confidence": 0.8}, {"min_confidence": 0.8, "confirm_time": 0.3}])
+def test_a_held_hand_does_not_drive_because_it_is_read_now(change: dict[str, float]) -> None:
+    settings = {"arming": "on", "engage": "off", "renew": "off"}
+    signs = {"min_confidence": 1.0, "release_confidence": 1.0}
+    script = {"script": "Stop:1 Forward:600"}
+    config = Config.model_validate(
+        {"camera": {"source": "virtual"}, "control": settings, "signs": signs, "virtual_hand": script}
+    )
+
+    with Graph(config, SteppedClock()) as graph:
+        graph.run_stepped(4.0)
+        graph.reconfigure(graph.config.model_copy(update={"signs": SignsConfig.model_validate(change)}))
+        graph.run_stepped(4.0)
+        assert graph.recognition.counts["Forward"] > 60
+        assert graph.robot.path_length_m < 0.001

@@ -37,6 +37,7 @@ from handsteer.recognition.custom_signs import save_custom_model
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import Recognition, Recognizer
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
+from handsteer.timeouts import FAULT_GAP_S
 from handsteer.transports.base import Received
 from handsteer.types import FORWARD, RELEASED
 from tests.nodes.stepping import Bench
@@ -543,21 +544,41 @@ def test_none_comes_within_the_timeout_and_a_moment(bench: RecognitionBench) -> 
     assert bench.names[-1] == "NONE"
 
 
-def test_other_confidences_and_times_count_from_the_next_frame(bench: RecognitionBench) -> None:
+PAUSE = 24
+"""More frames than there are without a sign after a change of what is read, and until one is confirmed."""
+
+
+def test_other_confidences_and_times_count_after_a_pause(bench: RecognitionBench) -> None:
     bench.show(frames=6)
     bench.node.reconfigure(Config.model_validate({"signs": {"min_confidence": 1.0, "release_confidence": 1.0}}))
-    bench.show(frames=6)
+    bench.show(frames=PAUSE)
     assert bench.names[-2:] == ["NONE"] * 2
     bench.node.reconfigure(Config.model_validate({"signs": {"confirm_time": 0.0}}))
-    bench.show(frames=1)
+    bench.show(frames=PAUSE)
     assert bench.names[-1] == "Forward"
+
+
+def test_a_change_of_what_is_read_is_a_pause_that_the_control_takes_for_a_fault(bench: RecognitionBench) -> None:
+    bench.show(frames=6)
+    bench.node.reconfigure(Config())
+    bench.show(frames=1)
+    assert len(bench.signs) == 7, "nothing was changed"
+    bench.node.reconfigure(Config.model_validate({"signs": {"min_confidence": 0.5}}))
+    times_s: dict[str, list[float]] = {"NONE": [], "Forward": []}
+    for frame in range(1, 1 + PAUSE):
+        bench.signs.clear()
+        bench.show()
+        for name in bench.names:
+            times_s[name].append(frame / 30)
+    assert times_s["NONE"][0] > FAULT_GAP_S
+    assert times_s["Forward"][0] > Config().control.sign_timeout
 
 
 def test_a_shorter_age_of_frames_counts_at_once(bench: RecognitionBench) -> None:
     bench.show(frames=6, age_s=0.2)
     assert bench.names[-1] == "Forward"
     bench.node.reconfigure(Config.model_validate({"signs": {"max_frame_age": 0.1}}))
-    bench.show(frames=6, age_s=0.2)
+    bench.show(frames=PAUSE, age_s=0.2)
     assert bench.names[-1] == "NONE"
 
 
@@ -565,7 +586,7 @@ def with_model(path: Path) -> Config:
     return Config.model_validate({"signs": {"model": path}})
 
 
-def test_another_model_counts_from_the_next_frame_and_a_sign_is_confirmed_anew(tmp_path: Path) -> None:
+def test_another_model_counts_after_a_pause(tmp_path: Path) -> None:
     path = tmp_path / "mine.npz"
     save_custom_model(model(hi=0.99), path)
     bench = RecognitionBench(hand=show_fingers("index", "little"))
@@ -573,8 +594,8 @@ def test_another_model_counts_from_the_next_frame_and_a_sign_is_confirmed_anew(t
     assert set(bench.names) == {"NONE"}
     bench.node.check(with_model(path))
     bench.node.reconfigure(with_model(path))
-    bench.show(frames=6)
-    assert (bench.names[-6], bench.names[-1]) == ("NONE", "Hi")
+    bench.show(frames=PAUSE)
+    assert (bench.names[5], bench.names[-1]) == ("NONE", "Hi")
     path.unlink()
     bench.node.check(with_model(path))
     bench.node.reconfigure(with_model(path))
@@ -583,10 +604,11 @@ def test_another_model_counts_from_the_next_frame_and_a_sign_is_confirmed_anew(t
 
     save_custom_model(model(hi=0.01, ho=0.98), path)
     bench.node.reconfigure(with_model(path))
-    bench.show(frames=6)
-    assert (bench.names[-6], bench.names[-1]) == ("NONE", "Ho"), "a file that was written anew is read again"
+    bench.signs.clear()
+    bench.show(frames=PAUSE)
+    assert (bench.names[0], bench.names[-1]) == ("NONE", "Ho"), "a file that was written anew is read again"
     bench.node.reconfigure(Config())
-    bench.show(frames=5)
+    bench.show(frames=PAUSE)
     assert set(bench.names[-5:]) == {"NONE"}
     assert bench.node.callback_errors == 0
 

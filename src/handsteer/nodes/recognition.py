@@ -69,6 +69,9 @@ _MOST_PLAYED_BYTES = 2**28
 _REPORT_PLAYED_S = 5.0
 _SLOWER = "the recording is played faster than this machine recognises: play it at a lower rate (-r 0.5)"
 
+_CHANGED = "what is read in pictures was changed"
+_CHANGED_MARGIN_S = 0.1
+
 _BESIDE_PLAYER = "old frames do not count while a recording is played next to another publisher of the same topic"
 
 _FREEZE_EXPLAINED_S = 3.0
@@ -136,7 +139,7 @@ class HandSignRecognitionNode(Node):
         self._has_explained_freeze = False
         self._refused_s = -math.inf
         self._recognition: Recognition | None = None
-        self._camera_since_s = -math.inf
+        self._camera_since_s = self._changed_until_s = -math.inf
         StopKeeper(self)
         self._sign = self.publisher(sign)
         self._joy = self.publisher(joy)
@@ -178,8 +181,17 @@ class HandSignRecognitionNode(Node):
                 raise ConfigError(f"signs.model: {error}") from None
 
     def on_reconfigure(self, config: Config) -> None:
-        """Apply the confidences and times of ``signs``; its model and profile if a file was replaced or rewritten."""
-        if self._has_other_models(config.signs):
+        """Apply ``signs``, with its model and profile if a file was replaced or rewritten, and ``joystick``.
+
+        After a change of ``signs``, nothing is published until the control has noticed a pause, so that it waits for
+        neutral: a hand that is held still may now show a sign that it did not show before.
+        """
+        has_other_models = self._has_other_models(config.signs)
+        if has_other_models or config.signs != self._config:
+            pause_s = max(config.control.sign_timeout, _SILENCE_PERIOD_S) + _CHANGED_MARGIN_S
+            self._changed_until_s = self.clock.now() + pause_s
+            self._forget()
+        if has_other_models:
             versions = _versions_of(config.signs)
             self._pipeline.recognizer.use(open_classifier(config.signs))
             self._pipeline.forget_gestures()
@@ -216,6 +228,8 @@ class HandSignRecognitionNode(Node):
         self._refused = self._why_old(began_s, captured_s, is_late=received.is_late)
         if self._refused is None and captured_s < self._camera_since_s:
             self._refused = "a picture of the camera before"
+        elif self._refused is None and began_s < self._changed_until_s:
+            self._refused = _CHANGED
         if self._refused is None and self._stall_guard.distrusts(began_s):
             self._refused = f"{TOO_SLOW}: pictures may have waited"
         image = self._picture(received, picture_of, began_s)

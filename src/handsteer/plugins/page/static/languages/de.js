@@ -40,6 +40,7 @@ const WORDS = {
   "What the camera sees": "Was die Kamera sieht",
   "the camera was changed": "die Kamera wurde gewechselt",
   "a picture of the camera before": "ein Bild der vorigen Kamera",
+  "what is read in pictures was changed": "was in Bildern gelesen wird, wurde geändert",
   "Pictures of that device's camera arrive # s late: the network or that device may be slow": "Bilder der Kamera jenes Geräts kommen # s zu spät: das Netz oder das Gerät könnte langsam sein",
   "this camera is not in the list any more: open the list again": "diese Kamera ist nicht mehr in der Liste: öffne die Liste noch einmal",
   "another camera was chosen meanwhile": "inzwischen wurde eine andere Kamera gewählt",
