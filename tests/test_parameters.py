@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from handsteer import config
 from handsteer.config import Config, ControlConfig
 from handsteer.errors import ConfigError
-from handsteer.parameters import NodeParameters, from_parameters
+from handsteer.parameters import NodeParameters, Value, from_parameters
 
 NODE = "/r1/hand_sign_recognition"
 
@@ -110,6 +110,19 @@ def test_what_is_read_at_the_start_can_only_be_set_to_what_it_is() -> None:
     parameters.set({"landmarks.model": "fast", "image_transport": "auto"})
     with pytest.raises(ConfigError, match=r"^landmarks.model cannot be set: it is only read when the node starts"):
         parameters.set({"landmarks.model": "lite"})
+
+
+def test_a_parameter_of_the_own_section_is_set_by_its_declared_name_alone() -> None:
+    applied: list[Config] = []
+    parameters = NodeParameters(Config(), "control", applied.append)
+    changes: dict[str, Value] = {"control.max_linear": 0.5, "control.actions.Peace": "turbo"}
+    for name, value in changes.items():
+        assert parameters.describe(name) is None
+        with pytest.raises(ConfigError, match=rf"^{name}: there is no such parameter; the parameters are .*max_linear"):
+            parameters.set({name: value})
+    assert applied == []
+    # Nested in a file, it still counts at the start.
+    assert from_parameters({"control": {"max_linear": 0.5}}, "control", "/node") == {"control": {"max_linear": 0.5}}
 
 
 @pytest.mark.parametrize("section", list(Config.model_fields))

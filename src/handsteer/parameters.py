@@ -253,8 +253,9 @@ class NodeParameters:
         own = section_model(section)
         if name.partition(".")[0] not in {*own.model_fields, *own.renamed}:
             section, _, rest = name.partition(".")
-        if section not in self._sections:
-            return None
+            # The own section is not a prefix: a value set by a second name would not be reported by the first.
+            if section not in _USED_TOGETHER.get(self._section, ()):
+                return None
         model = section_model(section)
         field, _, entry = rest.partition(".")
         field = model.renamed.get(field, field)
