@@ -8,8 +8,10 @@ from hypothesis import strategies as st
 
 from handsteer import config
 from handsteer.config import Config, ControlConfig
+from handsteer.config.driving import MOST_ACTIONS
 from handsteer.errors import ConfigError
 from handsteer.parameters import NodeParameters, Value, from_parameters
+from handsteer.types import LONGEST_SIGN
 
 NODE = "/r1/hand_sign_recognition"
 
@@ -137,6 +139,17 @@ def test_every_parameter_of_every_node_has_a_fitting_description(section: str) -
         if description.minimum is not None:
             assert isinstance(value, int | float), name
             assert description.minimum <= value
+
+
+def test_actions_have_a_number_and_a_length_that_the_control_can_look_up() -> None:
+    """Any node of the graph may set them, and the control compares each sign with all of them."""
+    parameters = NodeParameters(Config(), "control", lambda _: None)
+    parameters.set({f"actions.N{number}": "turbo" for number in range(MOST_ACTIONS)})
+    with pytest.raises(ConfigError, match=r"^actions: .* should have at most 100 entries, not 101$"):
+        parameters.set({"actions.Peace": "turbo"})
+    parameters.set({"actions.N0": None, f"actions.{'x' * LONGEST_SIGN}": "turbo"})
+    with pytest.raises(ConfigError, match=r"^actions: .*names of at most 100 characters; 'x+\.\.\.' has 101$"):
+        parameters.set({"actions.N1": None, f"actions.{'x' * (LONGEST_SIGN + 1)}": "turbo"})
 
 
 LIVE = sorted(ControlConfig.live - {"ramp", "actions"})

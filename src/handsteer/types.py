@@ -37,6 +37,8 @@ NONE = "NONE"
 """No hand, or a hand that shows none of the signs."""
 
 SIGNS = (STOP, FORWARD, BACKWARD, TURN_RIGHT, TURN_LEFT, GO)
+LONGEST_SIGN = 100
+"""Longer words, in characters, are not names of signs."""
 MOTION_SIGNS = frozenset({FORWARD, BACKWARD, TURN_RIGHT, TURN_LEFT})
 """The signs that can make a robot move."""
 
@@ -47,10 +49,12 @@ def find_sign(name: str, known: Iterable[str]) -> str | None:
     Case, spaces, ``_`` and ``-`` are ignored: ``TurnRight``, ``turn_right`` and ``turn right`` all mean ``Turn Right``.
     So are Unicode forms: an accent may be part of its letter or follow it, and letters may have full width.
     """
-    return next((sign for sign in known if _bare(sign) == _bare(name)), None)
+    bare = bare_sign(name)
+    return next((sign for sign in known if bare_sign(sign) == bare), None)
 
 
-def _bare(name: str) -> str:
+def bare_sign(name: str) -> str:
+    """Return ``name`` as :func:`find_sign` compares it: two names with the same result mean the same sign."""
     return "".join(letter for letter in unicodedata.normalize("NFKC", name).casefold() if letter not in " _-\t")
 
 

@@ -18,8 +18,9 @@ from pydantic import Field, field_validator
 
 from handsteer.config.section import EMPTY_IS_NONE, Section, live
 from handsteer.doors import ACTIONS, ASSISTS, ROBOTS, TRANSPORTS
+from handsteer.errors import quoted
 from handsteer.timeouts import ODOMETRY_S, RENEW_S, ROBOT_S, STALE_S
-from handsteer.types import ALWAYS_STOP, BUILT_IN, Action, CmdVelType, find_sign
+from handsteer.types import ALWAYS_STOP, BUILT_IN, LONGEST_SIGN, Action, CmdVelType, bare_sign, find_sign
 
 Preset = Literal["generic", "turtlebot3_burger", "turtlebot3_waffle", "turtlebot4", "turtlesim"]
 
@@ -42,6 +43,8 @@ SIGN_EFFECTS: tuple[Any, ...] = (*get_args(Action), *ACTIONS.names())
 """What signs can do: the built-in actions, and those of plug-ins."""
 NEXT = "next"
 """On ``/select_robot``, the following robot instead of the name of one."""
+MOST_ACTIONS = 100
+"""Entries of ``control.actions``: any node of the graph may add some, and each sign is compared with all of them."""
 _NAMESPACE = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 
@@ -207,14 +210,22 @@ class ControlConfig(Section):
     @field_validator("actions")
     @classmethod
     def _known_names_and_a_way_to_stop(cls, actions: dict[str, Action]) -> dict[str, Action]:
+        if len(actions) > MOST_ACTIONS:
+            raise ValueError(f"should have at most {MOST_ACTIONS} entries, not {len(actions)}")
         named: dict[str, Action] = {}
+        taken: set[str] = set()
         for name, action in actions.items():
+            if len(name) > LONGEST_SIGN:
+                raise ValueError(
+                    f"should have names of at most {LONGEST_SIGN} characters; {quoted(name)} has {len(name)}"
+                )
             sign = find_sign(name, BUILT_IN) or name.strip()
-            if not sign or find_sign(sign, named) is not None:
+            if not sign or bare_sign(sign) in taken:
                 raise ValueError(f"should name each sign once; {name!r} does not")
             if sign in ALWAYS_STOP and action != "stop":
                 raise ValueError(f"should leave {sign} at 'stop', so that the robot can always be stopped")
             named[sign] = action
+            taken.add(bare_sign(sign))
         return named
 
 

@@ -47,14 +47,12 @@ from handsteer.timeouts import ODOMETRY_S
 from handsteer.transports.base import Call, Received, Transport
 from handsteer.transports.commands import Commands
 from handsteer.transports.timing import Repeats
-from handsteer.types import NONE, ZERO, Stick, Velocity, action_of
+from handsteer.types import LONGEST_SIGN, NONE, ZERO, Stick, Velocity, action_of
 
 log = logging.getLogger(__name__)
 
 _WATCHDOG_PERIOD_S = 0.02
 _DIAGNOSE_PERIOD_S = 0.1
-_LONGEST_SIGN = 100
-"""Longer words, in characters, are not names of signs."""
 _STOPPED = "stopped, until it is reset"
 
 
@@ -221,7 +219,7 @@ class HandSignControlNode(Node):
 
     def _on_sign(self, received: Received[String]) -> None:
         sign = received.message.data
-        if len(sign) > _LONGEST_SIGN or not sign.isprintable():
+        if len(sign) > LONGEST_SIGN or not sign.isprintable():
             self._take(received.captured_s, is_late=True, is_stop=True)
             return
         is_stop = action_of(sign, self._config.actions) == "stop"
