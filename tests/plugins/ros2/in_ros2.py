@@ -11,6 +11,9 @@ from typing import Any
 
 import pytest
 import rclpy
+from rcl_interfaces.msg import Parameter as TheirParameter
+from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from std_msgs.msg import Bool as TheirBool
@@ -153,6 +156,56 @@ def test_an_empty_list_has_no_type_and_is_taken(joined: Join, tmp_path: Path) ->
     assert session.parameters == {"robots": [], "names": {"of": []}, "max_linear": 0.5}
     session.serve(NodeParameters(Config(), "control", lambda _: None))
     assert session._node.get_parameter("robots").value == []  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("kind", "answers"), [(SetParameters, [False, True]), (SetParametersAtomically, [False])], ids=["each", "all"]
+)
+def test_a_parameter_of_an_unknown_type_is_refused_with_an_answer(
+    joined: Join, domain: int, capfd: pytest.CaptureFixture[str], kind: Any, answers: list[bool]
+) -> None:
+    session = joined()
+    applied: list[Config] = []
+    session.serve(NodeParameters(Config(), "control", applied.append))
+    given = [
+        TheirParameter(name="max_linear", value=ParameterValue(type=99)),
+        TheirParameter(name="max_angular", value=ParameterValue(type=3, double_value=0.5)),
+    ]
+    service = "set_parameters" if kind is SetParameters else "set_parameters_atomically"
+    with other_node(domain) as node:
+        client = node.create_client(kind, f"{session.name}/{service}")
+        assert client.wait_for_service(10.0)
+        answer = client.call_async(kind.Request(parameters=given))
+        executor = rclpy.executors.SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+        executor.spin_until_future_complete(answer, 5.0)
+        executor.shutdown()
+    assert answer.done()
+    reply = answer.result()
+    results = reply.results if kind is SetParameters else [reply.result]
+    assert [each.successful for each in results] == answers
+    assert results[0].reason == "max_linear: 99 is not the number of a type of parameters"
+    assert len(applied) == sum(answers)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_what_fails_again_and_again_is_logged_once_with_its_place(
+    joined: Join, caplog: pytest.LogCaptureFixture
+) -> None:
+    session = joined()
+    logging.getLogger("handsteer").addHandler(caplog.handler)
+    failed = 0
+
+    def fail() -> None:
+        nonlocal failed
+        failed += 1
+        raise RuntimeError("broken")
+
+    session._node.create_timer(0.001, fail)  # type: ignore[attr-defined]
+    assert eventually(lambda: failed > 3)
+    (record,) = [each for each in caplog.records if each.levelno >= logging.ERROR]
+    assert record.getMessage() == "/tests: callback of ROS 2 failed"
+    assert record.exc_info is not None
 
 
 def test_a_profile_can_be_overridden_of_what_is_opened_after_the_parameters_are_served(joined: Join) -> None:

@@ -2,6 +2,7 @@
 
 import logging
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
@@ -9,6 +10,7 @@ from typing import Any
 
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.srv import SetParameters
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
@@ -24,8 +26,9 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from handsteer.clock import Clock, SimulatedClock, WallClock
-from handsteer.errors import ConfigError, HandsteerError, TransportError
+from handsteer.errors import ConfigError, HandsteerError, TransportError, as_name
 from handsteer.messages import CLOCK
+from handsteer.nodes.callbacks import FailureLog
 from handsteer.parameters import Description, NodeParameters, Value
 from handsteer.plugins.ros2.arguments import nested
 from handsteer.plugins.ros2.parameter_services import TYPES, descriptor
@@ -44,6 +47,7 @@ _AUTOSTART = "autostart"
 _OF_ROS = ("use_sim_time", "start_type_description_service", _AUTOSTART)
 _SCALARS = (Parameter.Type.BOOL, Parameter.Type.INTEGER, Parameter.Type.DOUBLE)
 _SWITCH = {True: "on", False: "off"}
+_NUMBERS = frozenset(kind.value for kind in Parameter.Type)
 _ARRAYS = tuple(kind for kind in Parameter.Type if kind.name.endswith("_ARRAY"))
 # One function per level, because rclpy requires that a line of code always logs at the same level.
 _LOG_AS: dict[int, Callable[[Any, str], None]] = {
@@ -185,14 +189,15 @@ class RclpySession(Session):
     def _spin(self) -> None:
         executor = self._executor
         assert executor is not None
+        failures = FailureLog(self.name)
         while not self._left.is_set():
             try:
                 executor.spin_once()
             except (ExternalShutdownException, ShutdownException):
                 return
-            except Exception:
+            except Exception as error:
                 if not self._left.is_set():
-                    log.exception("ROS 2: a message could not be served")
+                    failures.add("ROS 2", error, time.monotonic())  # others may cause it, as often as they like
                     self._left.wait(_AFTER_FAILURE_S)  # repeated failures must not use up the processor
 
 
@@ -317,6 +322,35 @@ def take_given(node: Node) -> dict[str, Any]:
     return nested(values)
 
 
+class _AnsweringParameterService(ParameterService):  # type: ignore[misc]
+    """rclpy's services, which also answer a value of an unknown type: rclpy raises, and its client waits without end.
+
+    rclpy calls both methods by these names; without them, its own are called.
+    """
+
+    def _set_parameters_callback(self, request: Any, reply: Any) -> Any:
+        reply.results = [self._set(one) for one in request.parameters]
+        return reply
+
+    def _set_parameters_atomically_callback(self, request: Any, reply: Any) -> Any:
+        refused = [one for one in request.parameters if one.value.type not in _NUMBERS]
+        if refused:
+            reply.result = _refusal(refused[0])
+            return reply
+        return super()._set_parameters_atomically_callback(request, reply)
+
+    def _set(self, one: Any) -> Any:
+        if one.value.type not in _NUMBERS:
+            return _refusal(one)
+        theirs = super()._set_parameters_callback(SetParameters.Request(parameters=[one]), SetParameters.Response())
+        return theirs.results[0]
+
+
+def _refusal(one: Any) -> SetParametersResult:
+    reason = f"{as_name(one.name)}: {one.value.type} is not the number of a type of parameters"
+    return SetParametersResult(successful=False, reason=reason)
+
+
 class ParameterLink:
     """Declares parameters to rclpy, and applies changes by others.
 
@@ -332,7 +366,7 @@ class ParameterLink:
         node.add_pre_set_parameters_callback(self._as_all_declared)
         node.add_on_set_parameters_callback(self._set)
         # Only now, because rclpy would accept values for parameters that are not declared yet.
-        self._services = ParameterService(node)
+        self._services = _AnsweringParameterService(node)
 
     def _declare(self, name: str, value: Value) -> None:
         description = self._parameters.describe(name)
