@@ -41,6 +41,31 @@ def test_what_is_wrong_has_its_full_name(parameters: dict[str, Any], message: st
 
 
 @pytest.mark.parametrize(
+    ("given", "section", "message"),
+    [
+        ({"actions": {"Bad": "fly"}}, "control", rf"^ROS parameter {NODE}/actions\.Bad: 'fly' should be 'forward', "),
+        (
+            {"control": {"actions": {"Bad": "fly"}}},
+            "signs",
+            rf"^ROS parameter {NODE}/control/actions\.Bad: 'fly' should",
+        ),
+        (
+            {"full_deflection": 0.001},
+            "joystick",
+            rf"^ROS parameter {NODE}/full_deflection: joystick: .* should be above",
+        ),
+        ({"actions": {"Stop": "go"}}, "control", rf"^ROS parameter {NODE}/actions: {{'Stop': 'go'}} should leave Stop"),
+    ],
+    ids=str,
+)
+def test_what_is_wrong_in_a_table_or_with_others_has_its_full_name_too(
+    given: dict[str, Any], section: str, message: str
+) -> None:
+    with pytest.raises(ConfigError, match=message):
+        from_parameters(given, section, NODE)
+
+
+@pytest.mark.parametrize(
     ("parameters", "said"),
     [
         ({"min_confidense": 0.5}, "/min_confidense: did you mean min_confidence"),

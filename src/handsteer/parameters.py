@@ -95,8 +95,9 @@ def _checked(section: str, name: str, value: Any, full_name: str) -> Any:
     try:
         validate(Config, {section: {name: value}})
     except ConfigError as error:
-        problem = str(error).removeprefix(f"{section}.{name}").removeprefix(": ")
-        raise ConfigError(f"ROS parameter {full_name}: {problem}") from None
+        # After its name there is a colon or, for a table, a dot and the entry; a problem of the section lacks the name.
+        problem = f": {error}".removeprefix(f": {section}.{name}")
+        raise ConfigError(f"ROS parameter {full_name}{problem}") from None
     return value
 
 
