@@ -177,6 +177,14 @@ class NodeParameters:
             return None
         return replace(describe(place.model, place.field), removable=place.entry is not None)
 
+    def new_name(self, name: str) -> str:
+        """Return the declared name of the parameter that ``name`` means, which may be an old one."""
+        place = self._place(name)
+        if place is None:
+            return name
+        inside = () if place.section == self._section else (place.section,)
+        return ".".join((*inside, place.field, *((place.entry,) if place.entry else ())))
+
     def set(self, changes: Mapping[str, Value | None]) -> None:
         """Set parameters, all of them or none; None removes an entry of a table.
 

@@ -15,6 +15,7 @@ from rcl_interfaces.msg import Parameter as TheirParameter
 from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.duration import Duration
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from std_msgs.msg import Bool as TheirBool
 from std_msgs.msg import String as TheirString
@@ -187,6 +188,16 @@ def test_a_parameter_of_an_unknown_type_is_refused_with_an_answer(
     assert results[0].reason == "max_linear: 99 is not the number of a type of parameters"
     assert len(applied) == sum(answers)
     assert "Traceback" not in capfd.readouterr().err
+
+
+def test_a_parameter_that_is_set_by_its_old_name_is_reported_by_its_new_one(joined: Join) -> None:
+    session = joined()
+    session.serve(NodeParameters(Config(), "signs", lambda _: None))
+    node = session._node  # type: ignore[attr-defined]
+    (result,) = node.set_parameters([Parameter("bridge_time", value=0.3)])
+    assert result.successful
+    assert node.get_parameter("dropout_hold").value == 0.3
+    assert not node.has_parameter("bridge_time")
 
 
 def test_what_fails_again_and_again_is_logged_once_with_its_place(

@@ -380,8 +380,13 @@ class ParameterLink:
         self._node.set_parameters([Parameter(name, kind, typed)])
 
     def _as_all_declared(self, given: list[Parameter]) -> list[Parameter]:
-        """Return ``given`` with declared types: an empty list in YAML has no type, and ``off`` is not a text."""
-        return [self._as_declared(one) for one in given]
+        """Return ``given`` with declared names and types.
+
+        A value set by an old name would not be reported by the new one; an empty list in YAML has no type, and ``off``
+        is not a text.
+        """
+        named = [Parameter(self._parameters.new_name(one.name), one.type_, one.value) for one in given]
+        return [self._as_declared(one) for one in named]
 
     def _as_declared(self, one: Parameter) -> Parameter:
         description = self._parameters.describe(one.name)
