@@ -3,6 +3,7 @@
 import itertools
 import threading
 from collections.abc import Callable, Iterator
+from math import inf
 from pathlib import Path
 from typing import cast
 
@@ -20,6 +21,7 @@ from handsteer.plugins.page.lesson_state import SignClass
 from handsteer.plugins.page.lessons import KEPT, KEPT_TAKES, Lessons, with_signs
 from handsteer.plugins.page.sign_pictures import taught_drawings
 from handsteer.plugins.teach.dataset import Dataset, load_dataset, save_dataset
+from handsteer.plugins.teach.evaluation.views import View
 from handsteer.plugins.teach.exchange import load_shared, save_shared
 from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
 from handsteer.recognition.hand import Hand
@@ -32,6 +34,23 @@ from tests.recognition.models import model
 
 PATIENCE_S = 180.0
 IMAGE = np.full((48, 64, 3), 90, np.uint8)
+IMAGE[:, 32:] = 200
+"""Its left half is darker."""
+
+
+class SidedLandmarker(RecordedLandmarker):
+    """Finds one hand in :data:`IMAGE`, and its mirror image in the mirrored one."""
+
+    def __init__(self, hand: Hand) -> None:
+        super().__init__([])
+        self.hand = hand
+        self.resets = 0
+
+    def detect(self, image: np.ndarray, *, search: bool = True, dt_s: float = inf) -> list[Hand]:
+        return [View(flip=bool(image[0, 0, 0] > image[0, -1, 0])).hand(self.hand)]
+
+    def reset(self) -> None:
+        self.resets += 1
 
 
 class School:
@@ -306,6 +325,45 @@ def test_takes_are_recorded_only_while_the_page_is_there(school: School) -> None
         waiting.wait(0.05)
     assert lesson.state.recorded is None
     assert school.lessons.is_running, "the page may come back"
+
+
+def swap_sides(school: School, on: bool) -> None:
+    signs = school.config.signs.model_copy(update={"swap_sides": on})
+    school.config = school.config.model_copy(update={"signs": signs})
+
+
+@pytest.fixture
+def sided(school: School) -> SidedLandmarker:
+    """Used by the lessons of the school from here on."""
+    landmarker = SidedLandmarker(shaken("Peace", np.random.default_rng(4)))
+    school.lessons = Lessons(cast(Graph, school), lambda: (landmarker, open_classifier(Config().signs)))
+    return landmarker
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_lesson_sees_the_hands_that_recognition_sees(school: School, sided: SidedLandmarker, swapped: bool) -> None:
+    swap_sides(school, swapped)
+    begin(school)
+    record(school)
+    seen = View(flip=swapped).hand(sided.hand)
+    for each in own(school).takes:
+        assert {hand.handedness for hand in each.take.hands} == {seen.handedness}
+        assert all(np.allclose(hand.pixels, seen.pixels) for hand in each.take.hands)
+
+
+def test_no_take_has_hands_from_before_and_after_the_sides_are_swapped(school: School, sided: SidedLandmarker) -> None:
+    lesson = begin(school)
+    key = own(school).key
+    lesson.do(lambda of: of.record(key, hold=True))
+    school.wait_until(lambda: lesson.state.status.hands > 2)
+    assert sided.resets == 0
+    swap_sides(school, True)
+    school.wait_until(lambda: lesson.state.recorded is None)
+    assert (collected(school), sided.resets) == (0, 1)
+    record(school)
+    seen = View(flip=True).hand(sided.hand)
+    hands = [hand for each in own(school).takes for hand in each.take.hands]
+    assert all(np.allclose(hand.pixels, seen.pixels) for hand in hands)
 
 
 def test_what_is_no_name_of_a_person_is_refused(school: School) -> None:

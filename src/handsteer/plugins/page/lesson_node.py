@@ -5,9 +5,12 @@ import threading
 from collections.abc import Callable
 from typing import Final, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from handsteer.clock import Clock
 from handsteer.errors import TrainingError
-from handsteer.images import bgr_image
+from handsteer.images import bgr_image, mirrored
 from handsteer.messages import IMAGE_RAW, Image
 from handsteer.nodes.base import Node
 from handsteer.plugins.page.lesson import Lesson
@@ -39,12 +42,22 @@ class LessonNode(Node):
     Args:
         lesson: Used only by this node from here on.
         open_models: Opens the landmarker and the classifier of the shipped signs; called on this node's thread.
+        swaps_sides: Returns whether frames are mirrored before recognition now.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, lesson: Lesson, open_models: OpenModels) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        clock: Clock,
+        lesson: Lesson,
+        open_models: OpenModels,
+        swaps_sides: Callable[[], bool],
+    ) -> None:
         super().__init__("dashboard_lesson", transport, clock)
         self._lesson = lesson
         self._open_models = open_models
+        self._swaps_sides = swaps_sides
+        self._was_swapped: bool | None = None
         self._lock = threading.RLock()
         self._training: BackgroundTraining | None = None
         self._models: tuple[Landmarker, Classifier] | None = None
@@ -138,11 +151,22 @@ class LessonNode(Node):
         if self._classifier is None or self._classifier[0] is not state.model:
             self._classifier = state.model, CustomClassifier(shipped, state.model) if state.model else shipped
         classifier = self._classifier[1]
-        hand = largest(landmarker.detect(bgr_image(received.message)))
+        hand = largest(landmarker.detect(self._as_recognised(bgr_image(received.message), landmarker)))
         guess = classifier.classify(hand) if hand is not None else _NOTHING
         confidences = {sign: classifier.confidence(sign, chance) for sign, chance in guess.likelihoods.items()}
         with self._lock:
             self._lesson.see(hand, guess, confidences, step_s)
+
+    def _as_recognised(self, image: NDArray[np.uint8], landmarker: Landmarker) -> NDArray[np.uint8]:
+        """Return ``image`` as the recognition gets it, so that it finds in it what is taught."""
+        is_swapped = self._swaps_sides()
+        if self._was_swapped not in (None, is_swapped):
+            # The hands of a take would be mirror images of each other.
+            landmarker.reset()
+            with self._lock:
+                self._lesson.pause()
+        self._was_swapped = is_swapped
+        return mirrored(image) if is_swapped else image
 
     def _watch(self) -> None:
         now = self.clock.now()

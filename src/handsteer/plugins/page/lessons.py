@@ -127,7 +127,9 @@ class Lessons:
                 if read != self._draft_read:
                     lesson.add_dataset(dataset, None)  # of another program, since then
             self._draft = None
-            node = LessonNode(self._graph.transport, self._graph.clock, lesson, self._open_models)
+            graph = self._graph
+            # Asked again for each frame, because it can change meanwhile.
+            node = LessonNode(graph.transport, graph.clock, lesson, self._open_models, lambda: self.signs.swap_sides)
             self._current = _Current(viewer, node, read)
             node.start()
 
