@@ -1,6 +1,7 @@
 """A calibration on the nodes of a graph, without a page: real hands of a made-up person, a real profile."""
 
 import itertools
+import math
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -9,18 +10,19 @@ from typing import cast
 import numpy as np
 import pytest
 
-from handsteer.clock import RealClock
+from handsteer.clock import RealClock, SteppedClock
 from handsteer.config import Config, SignsConfig
 from handsteer.errors import ProfileError
 from handsteer.graph import Graph
 from handsteer.images import image_message
 from handsteer.messages import IMAGE_RAW, Header
-from handsteer.plugins.page.calibration import CalibrationNode, Calibrations
+from handsteer.plugins.page.calibration import COUNTDOWN_S, TAKE_S, CalibrationNode, Calibrations, CalibrationState
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.profile import load_profile, profile_path
 from handsteer.recognition.recognizer import open_classifier
 from handsteer.transports.in_process import InProcessTransport
 from handsteer.types import FORWARD, SIGNS, STOP
+from tests.recognition.hands import RecordedLandmarker
 from tests.recognition.odd_person import odd_hands
 
 PATIENCE_S = 300.0
@@ -145,6 +147,70 @@ def test_nothing_is_recorded_while_the_page_is_away(room: Room) -> None:
     room.wait_until(lambda: node.state.status.phase == "recording")
     room.wait_until(lambda: node.state.status.phase == "countdown", attends=False)
     assert node.state.result is None
+
+
+class Booth:
+    """One calibration that is run step by step, ten frames a second; each is looked at for ``looks_for_s``."""
+
+    def __init__(self, looks_for_s: float = 0.0) -> None:
+        self.clock = SteppedClock()
+        transport = InProcessTransport()
+        self.node = CalibrationNode(transport, self.clock, "Ann", ["right"], lambda: Looker(self, looks_for_s))
+        self._images = transport.advertise("my_camera", IMAGE_RAW)
+
+    def run(self, duration_s: float, *, pictures: bool = True) -> CalibrationState:
+        for _ in range(round(duration_s * 10)):
+            self.clock.advance(0.1)
+            self.node.attend()
+            if pictures:
+                header = Header(self.clock.stamp(self.clock.now()), "camera")
+                self._images.publish(image_message(IMAGE, header), self.clock.now())
+            self.node.spin_once()
+        return self.node.state
+
+
+class Looker(RecordedLandmarker):
+    """Always finds a hand, while time passes."""
+
+    def __init__(self, booth: Booth, takes_s: float) -> None:
+        super().__init__([[hand] for hand in odd_hands(40, seed=0)[SIGNS[0]]] * 10)
+        self._booth, self._takes_s = booth, takes_s
+
+    def detect(self, image: np.ndarray, *, search: bool = True, dt_s: float = math.inf) -> list[Hand]:
+        self._booth.clock.advance(self._takes_s)
+        self._booth.node.attend()
+        return super().detect(image, search=search, dt_s=dt_s)
+
+
+def test_a_take_begins_again_after_the_camera_was_lost() -> None:
+    booth = Booth()
+    state = booth.run(COUNTDOWN_S + 1.5)
+    assert state.status.phase == "recording"
+    assert state.status.hands > 10
+    assert booth.run(0.8, pictures=False).status == state.status, "a short pause is none"
+    state = booth.run(0.5, pictures=False)
+    assert (state.words, state.status.phase) == ("No picture comes from the camera.", "countdown")
+    booth.run(30.0, pictures=False)
+    state = booth.run(0.1)
+    assert (state.words, state.status.left_s) == ("in 2 s", COUNTDOWN_S)
+    state = booth.run(COUNTDOWN_S + TAKE_S - 0.3)
+    assert (state.step, state.status.phase) == (0, "recording")
+    assert state.status.hands <= TAKE_S * 10 + 1, "none from before"
+    assert booth.run(0.6).step == 1
+
+
+def test_a_picture_that_is_looked_at_for_long_is_no_lost_camera() -> None:
+    booth = Booth(looks_for_s=1.5)
+    for _ in range(30):
+        assert booth.run(0.1).has_picture
+    assert booth.node.state.step > 0
+
+
+def test_after_the_last_sign_a_lost_camera_changes_nothing() -> None:
+    booth = Booth()
+    for _ in SIGNS:
+        booth.node.skip()
+    assert booth.run(2.0, pictures=False).has_picture
 
 
 def test_what_is_no_name_or_no_profile_is_refused(room: Room) -> None:

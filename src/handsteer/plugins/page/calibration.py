@@ -34,6 +34,7 @@ COUNTDOWN_S: Final = 2.0
 _MOST_TRIES: Final = 3
 _LONGEST_STEP_S: Final = 0.5
 _UNATTENDED_S: Final = 1.0
+_NO_FRAME_S: Final = 1.0
 _WATCH_PERIOD_S: Final = 0.2
 _READY: Final = Status("countdown", COUNTDOWN_S, 0)
 
@@ -49,6 +50,7 @@ class CalibrationState:
         steps: Number of signs times hands.
         status: Progress of recording.
         has_hand: Whether a hand is in view.
+        has_picture: Whether pictures come from the camera.
         result: The profile and the result for each sign; None until it is made.
         message: What went wrong, or what has happened; empty if nothing.
     """
@@ -59,6 +61,7 @@ class CalibrationState:
     steps: int
     status: Status = _READY
     has_hand: bool = False
+    has_picture: bool = True
     result: Calibration | None = None
     message: str = ""
 
@@ -68,10 +71,15 @@ class CalibrationState:
         return not self.sign and self.result is None and not self.message
 
     @property
-    def number(self) -> str:
-        """The countdown in seconds, or the number of recorded hands."""
-        is_recording = self.status.phase == "recording"
-        return str(self.status.hands if is_recording else math.ceil(self.status.left_s))
+    def words(self) -> str:
+        """What is to be done now, with the countdown in seconds or the number of recorded hands."""
+        if not self.has_picture:
+            return "No picture comes from the camera."
+        if not self.has_hand:
+            return "No hand is in view."
+        if self.status.phase == "recording":
+            return f"hold it: {self.status.hands} hands"
+        return f"in {math.ceil(self.status.left_s)} s"
 
 
 class CalibrationNode(Node):
@@ -101,7 +109,7 @@ class CalibrationNode(Node):
         self._lock = threading.RLock()
         self._landmarker: Landmarker | None = None
         self._last_s: float | None = None
-        self._attended_s = clock.now()
+        self._attended_s = self._looked_s = clock.now()
         self._tries = 0
         self.state = CalibrationState(*self._steps[0], step=0, steps=len(self._steps))
         self._collector = self._new_collector()
@@ -125,7 +133,7 @@ class CalibrationNode(Node):
                 return
             status = self._collector.step(hand, dt_s)
             self._tries += status.failed
-            self.state = replace(self.state, status=status, has_hand=hand is not None)
+            self.state = replace(self.state, status=status, has_hand=hand is not None, has_picture=True)
             if status.finished is not None:
                 self._shown[self.state.sign] += status.finished.hands
             if status.finished is not None or self._tries == _MOST_TRIES:
@@ -173,10 +181,20 @@ class CalibrationNode(Node):
             self._landmarker = self._open_hands()
         image = bgr_image(received.message)
         self.see(largest(self._landmarker.detect(mirrored(image) if self._swap else image)), step_s)
+        # Now, because a hand is looked for meanwhile, for long on a slow machine: the camera is not lost then.
+        self._looked_s = self.clock.now()
 
     def _watch(self) -> None:
+        now = self.clock.now()
         with self._lock:
-            if self.clock.now() - self._attended_s > _UNATTENDED_S and self.state.sign:
+            if not self.state.sign:
+                return
+            is_lost = now - self._looked_s > _NO_FRAME_S
+            if is_lost:
+                self._last_s = None  # the countdown begins with the next picture
+                self.state = replace(self.state, has_hand=False, has_picture=False)
+            # Another person may be in view when the page, or the picture, is back.
+            if is_lost or now - self._attended_s > _UNATTENDED_S:
                 self._collector = self._new_collector()
                 self.state = replace(self.state, status=_READY)
 

@@ -95,8 +95,7 @@ class CalibrationPanel:
             self._how.set_text(sentence(HOLD[state.sign]))
             if self._picture.content != DRAWN[state.sign][1]:
                 self._picture.set_content(DRAWN[state.sign][1])
-            words = f"hold it: {state.number} hands" if state.status.phase == "recording" else f"in {state.number} s"
-            self._count.set_text(words if state.has_hand else "No hand is in view.")
+            self._count.set_text(state.words)
         elif state.is_computing:
             self._what.set_text("Making the profile")
         else:
