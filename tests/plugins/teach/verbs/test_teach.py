@@ -15,6 +15,7 @@ from handsteer.plugins.teach.dataset import Dataset, load_dataset, save_dataset
 from handsteer.plugins.teach.onnx_file import as_onnx
 from handsteer.plugins.virtual_hand.camera import VirtualHandCamera
 from handsteer.recognition.custom_signs import save_custom_model
+from handsteer.recognition.hand import Hand
 from tests.cli.test_cli import fails, prints
 from tests.plugins.teach.takes import takes
 from tests.plugins.teach.test_exchange import row, written
@@ -63,6 +64,22 @@ def test_takes_are_collected_live_and_undone(capsys: pytest.CaptureFixture[str])
     assert prints(capsys, "signs", "collect", "--undo").splitlines()[1].split()[:2] == ["Peace", "1"]
     prints(capsys, "signs", "collect", "--undo")
     assert "there is no take to undo" in fails(capsys, "signs", "collect", "--undo")
+
+
+@pytest.mark.slow
+def test_takes_are_as_recognition_sees_them_with_swapped_sides(capsys: pytest.CaptureFixture[str], peace: Path) -> None:
+    def hands(*options: str) -> list[Hand]:
+        prints(capsys, "signs", "collect", "--label", "Peace", "--dataset", "some.npz", *options)
+        dataset = load_dataset(Path("some.npz"))
+        Path("some.npz").unlink()
+        return [hand for take in dataset.takes for hand in take.hands]
+
+    swapped = ["--signs.swap-sides", "true"]
+    assert {hand.handedness for hand in hands(*VIRTUAL, *QUICK)} == {"Right"}
+    assert {hand.handedness for hand in hands(*VIRTUAL, *QUICK, *swapped)} == {"Left"}
+    plain, other = hands("--camera", str(peace)), hands("--camera", str(peace), *swapped)
+    assert len(plain) == len(other) > 100
+    assert all(np.allclose(b.pixels[:, 0], 320 - a.pixels[:, 0], atol=0.1) for a, b in zip(plain, other, strict=True))
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 import datetime
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,8 @@ from handsteer.clock import RealClock
 from handsteer.config import Config
 from handsteer.errors import DatasetError
 from handsteer.plugins.teach.collect import Collector, Facts, Status, collect_live, collect_moment, collect_recorded
-from handsteer.plugins.teach.dataset import Dataset, add_takes, load_dataset, save_dataset
+from handsteer.plugins.teach.dataset import Dataset, Take, add_takes, load_dataset, save_dataset
+from handsteer.plugins.teach.evaluation.views import View
 from handsteer.plugins.teach.terminal import Keys, TerminalPicture
 from handsteer.plugins.teach.verbs.tables import dataset_table
 from handsteer.recognition.custom_signs import label_for
@@ -78,15 +79,24 @@ def collect_takes(config: Config, plan: Plan, recording: Path | None, moments: S
     fetch_missing(config)
     if recording is not None:
         landmarker = open_landmarker(config)
-        known = add_takes([collect_moment(recording, landmarker, facts, *part) for part in parts], plan.dataset)
+        takes = [collect_moment(recording, landmarker, facts, *part) for part in parts]
+        known = add_takes(_as_recognised(config, takes), plan.dataset)
     elif is_file:
         without: list[Path] = []
-        takes = list(collect_recorded(file, open_landmarker(config), facts, plan.take_s, without.append))
-        known = add_takes(takes, plan.dataset)
+        takes = collect_recorded(file, open_landmarker(config), facts, plan.take_s, without.append)
+        known = add_takes(_as_recognised(config, takes), plan.dataset)
         _say_without_hand(without)
     else:
         known = _live(config, plan, facts, known)
     print(dataset_table(known))
+
+
+def _as_recognised(config: Config, takes: Sequence[Take]) -> list[Take]:
+    """Return ``takes`` with the hands that recognition sees: its frames may be mirrored first."""
+    if not config.signs.swap_sides:
+        return list(takes)
+    view = View(flip=True)
+    return [replace(take, hands=tuple(view.hand(hand) for hand in take.hands)) for take in takes]
 
 
 def _say_without_hand(photos: Sequence[Path]) -> None:
@@ -118,7 +128,7 @@ def _live(config: Config, plan: Plan, facts: Facts, known: Dataset) -> Dataset:
                 view.show(image, hand, status, added)
 
             for take in collect_live(camera, landmarker, collector, clock, show=show, key_age=keys.space_age_s):
-                known = add_takes([take], plan.dataset)
+                known = add_takes(_as_recognised(config, [take]), plan.dataset)
                 added += 1
     except KeyboardInterrupt:
         say("ended; the takes so far are in the file")
