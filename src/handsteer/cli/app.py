@@ -175,7 +175,7 @@ def loads(*modules: str) -> Callable[[V], V]:
 
 
 def run(words: list[str]) -> int:
-    """Run the verb that ``words`` name; return the exit code: 0 for success, 2 for wrong input."""
+    """Run the verb that ``words`` name; return the exit code, as :func:`exit_code`."""
     set_up_logging()
     # To search what is installed takes a tenth of the time to load this.
     if not words or words[0] not in set(app) - set(app.help_flags):

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from handsteer.cli.signals import ending
 from handsteer.errors import HandsteerError, quoted
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 _NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 # Raised by what looks at a path, before it is opened.
 _NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP)
+# 128 + SIGPIPE, as standard tools; 0 would mean that a check has found nothing.
+_READER_HAS_LEFT = 141
 
 
 def set_up_logging() -> None:
@@ -35,7 +37,7 @@ def set_up_logging() -> None:
 
 
 def exit_code(call: Callable[[], int | None]) -> int:
-    """Return the exit code of ``call``; 2, with a message, if the input was wrong."""
+    """Return the exit code of ``call``: 2, with a message, if the input was wrong; 141 if the output has no reader."""
     try:
         code = call() or 0
         if sys.stdout is not None:
@@ -45,7 +47,7 @@ def exit_code(call: Callable[[], int | None]) -> int:
         return fail(str(error))
     except BrokenPipeError:  # the reader of the output has ended, as `head` does
         _discard_output()
-        return 0
+        return _READER_HAS_LEFT
     except OSError as error:
         if error.errno in _NOT_ALLOWED and error.filename is not None:
             return fail(f"cannot use {quoted(error.filename)}: {error.strerror}")
@@ -56,12 +58,20 @@ def exit_code(call: Callable[[], int | None]) -> int:
 
 
 def _discard_output() -> None:
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    """Discard what was not written yet to standard output: Python's last steps would try again, and fail."""
+    _discard(sys.stdout)
+
+
+def _discard(stream: TextIO) -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def fail(message: str) -> int:
-    """Print what was wrong with the input; return the exit code."""
-    say(" ".join(message.split()))
+    """Print what was wrong with the input; return the exit code, also if it cannot be printed."""
+    try:
+        say(" ".join(message.split()))
+    except OSError:
+        _discard(sys.stderr)
     return 2
 
 

@@ -13,6 +13,7 @@ from handsteer.messages import HAND_SIGN
 from handsteer.plugins.record.mcap_reader import McapFile
 from handsteer.plugins.record.replay.compare import Comparison, compare
 from handsteer.plugins.record.replay.rerun import recorded_config, rerun
+from tests.cli.test_cli import piped
 from tests.processes import Process, eventually
 from tests.reasons import check
 
@@ -75,6 +76,12 @@ def test_a_replay_says_that_all_is_the_same(recording: Path, capsys: pytest.Capt
     assert run("replay", str(recording)) == 0
     assert "241 frames, 241 signs, " in (printed := capsys.readouterr().out)
     assert printed.endswith("; all the same, bit for bit\n")
+
+
+@pytest.mark.slow
+def test_a_replay_whose_reader_leaves_does_not_say_that_all_is_the_same(recording: Path) -> None:
+    code, _, err = piped(f"replay {recording} --from signs --control.max-linear 0.1 2>&1", "true")
+    assert (code, err) == (141, "")
 
 
 def test_nothing_is_recorded_over(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
