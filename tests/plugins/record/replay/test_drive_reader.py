@@ -137,10 +137,10 @@ def test_stepped_time_has_no_latency(recording: Path) -> None:
     assert "stepped time" in facts.no_latency
 
 
-def test_latencies_are_from_the_capture_of_a_frame_to_its_command(recording: Path, tmp_path: Path) -> None:
-    frame = next(McapFile(recording).messages({IMAGE_COMPRESSED.name})).message
-    writer = McapWriter(tmp_path / "drive.mcap")
-    writer.describe("handsteer", {"clock_offset_s": "1000000.0"})
+def with_journal(path: Path, frame: Any, offset: str) -> Path:
+    """Write a drive of three frames, whose commands follow 10, 20 and 30 ms after them, with this offset."""
+    writer = McapWriter(path)
+    writer.describe("handsteer", {"clock_offset_s": offset})
 
     def write(time_s: float, topic: Topic[Any], message: Any, number: int = 0) -> None:
         writer.write(topic, topic.name, encode(message), int((1_000_000 + time_s) * 1e9), number)
@@ -155,10 +155,26 @@ def test_latencies_are_from_the_capture_of_a_frame_to_its_command(recording: Pat
         # The control publishes before the recorder gets the sign.
         write(captured_s + n / 100, HAND_SIGN, String(data=sign), n)
     writer.close()
-    facts = facts_of(tmp_path / "drive.mcap")
+    return path
+
+
+def test_latencies_are_from_the_capture_of_a_frame_to_its_command(recording: Path, tmp_path: Path) -> None:
+    frame = next(McapFile(recording).messages({IMAGE_COMPRESSED.name})).message
+    facts = facts_of(with_journal(tmp_path / "drive.mcap", frame, "1000000.0"))
     assert facts.latencies_ms.table()[:, 1] == pytest.approx([10.0, 20.0, 30.0], abs=0.01)
     (stand,) = facts.stands
     assert (stand.sign, stand.reason, stand.has_led) == ("Stop", "the Stop sign is shown", True)
+
+
+@pytest.mark.parametrize("offset", ["nan", "inf", "-1e300", "abc"])
+def test_without_an_offset_of_the_clock_that_is_a_time_latencies_are_unknown(
+    offset: str, recording: Path, tmp_path: Path
+) -> None:
+    frame = next(McapFile(recording).messages({IMAGE_COMPRESSED.name})).message
+    facts = facts_of(with_journal(tmp_path / "drive.mcap", frame, offset))
+    assert (facts.latency_ms(50), len(facts.stands)) == (None, 1)
+    assert facts.no_latency == "its metadata has no valid clock_offset_s"
+    assert f"{facts.no_latency}: latencies are unknown" in facts.problems
 
 
 @pytest.mark.slow

@@ -1,3 +1,5 @@
+import json
+import math
 from collections import Counter
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -7,13 +9,15 @@ import pytest
 from handsteer.config import Config, VirtualHandConfig
 from handsteer.errors import RecordingError
 from handsteer.graph import Graph
-from handsteer.messages import HAND_SIGN
+from handsteer.messages import HAND_SIGN, String
 from handsteer.nodes.journal import journal_topic
 from handsteer.plugins.record.mcap_reader import McapFile
 from handsteer.plugins.record.mcap_writer import McapWriter
 from handsteer.plugins.record.recorded import Recorded
 from handsteer.plugins.record.replay.compare import Comparison, Moment, compare
+from handsteer.plugins.record.replay.journals import parse_spin
 from handsteer.plugins.record.replay.rerun import Source, recorded_config, rerun
+from handsteer.transports.encoding import encode
 
 
 def replayed(path: Path, config: Config | None = None, source: Source = "frames") -> tuple[Comparison, list[Moment]]:
@@ -102,6 +106,24 @@ def test_without_a_journal_it_says_so(recording: Path, tmp_path: Path) -> None:
         list(rerun(file, Config()))
     with pytest.raises(RecordingError, match="contains no parameters"):
         recorded_config(file)
+
+
+@pytest.mark.parametrize("offset", ["nan", "inf", "-1e300", "abc"])
+def test_an_offset_of_the_clock_that_is_not_a_time_is_refused(offset: str, tmp_path: Path) -> None:
+    writer = McapWriter(tmp_path / "odd.mcap")
+    writer.describe("handsteer", {"clock_offset_s": offset})
+    writer.close()
+    with pytest.raises(RecordingError, match=rf"odd\.mcap: clock_offset_s: '{offset}' is not a valid time in seconds"):
+        list(rerun(McapFile(tmp_path / "odd.mcap"), Config(), "signs"))
+
+
+@pytest.mark.parametrize("time_s", [1e300, math.nan])
+@pytest.mark.parametrize("entry", ['{"t": [%s]}', '{"t": [1.0], "got": [["/hand_sign", 1, %s, false, false]]}'])
+def test_a_journal_with_a_number_that_is_not_a_time_is_damaged(time_s: float, entry: str) -> None:
+    data = String(data=entry % json.dumps(time_s))
+    recorded = Recorded("/journal", "std_msgs/msg/String", 0, 1, encode(data))
+    with pytest.raises(RecordingError, match=r"/journal is damaged at 0\.000 s: a number that is not a time"):
+        parse_spin(recorded)
 
 
 @pytest.mark.slow

@@ -29,7 +29,7 @@ from handsteer.nodes.status import OK, CameraStatus, ControlStatus, RecognitionS
 from handsteer.plugins.record.recorded import Recorded, Recording
 from handsteer.plugins.record.replay.drive_facts import Curve, DriveFacts, Event
 from handsteer.plugins.record.replay.drive_logs import MapThings, RobotLog, SignLog
-from handsteer.plugins.record.replay.journals import parse_spin
+from handsteer.plugins.record.replay.journals import clock_offset, parse_spin
 from handsteer.plugins.record.replay.reason_log import ReasonLog
 from handsteer.plugins.record.replay.stand_log import StandLog
 from handsteer.types import NONE
@@ -91,7 +91,7 @@ class _Reader:
         self._file = file
         self._began_s = self._now_s = began_s
         self._facts = facts = DriveFacts(file.path, dict(file.about))
-        self._offset_s = _number(file.about.get("clock_offset_s", ""))
+        self._offset_s = clock_offset(file.about)
         self._stands = StandLog(facts, began_s, self._offset_s or 0.0)
         self._signs = SignLog(facts)
         self._reasons = ReasonLog(facts, *_recorded_rules(file.about))
@@ -301,6 +301,10 @@ class _Reader:
         if not any(topic.endswith(journal_topic(_CONTROL).name) for topic in self._topics):
             facts.no_latency = "it has no journal, which recordings of handsteer run have"
             facts.problems.append(f"{facts.no_latency}: latencies are unknown")
+        elif self._offset_s is None:
+            facts.no_latency = "its metadata has no valid clock_offset_s"
+            facts.problems.append(f"{facts.no_latency}: latencies are unknown")
+            facts.latencies_ms = Curve(2)
         elif self._offset_s == 0.0:
             # Stamps of a real clock are Unix time.
             facts.no_latency = "it was recorded in stepped time, which has no delays"
@@ -316,14 +320,6 @@ def _recorded_rules(about: Mapping[str, str]) -> tuple[ControlConfig | None, Joy
         return ControlConfig.model_validate(sections["control"]), JoyConfig.model_validate(sections["joy"])
     except (ValueError, KeyError, TypeError, RecursionError):
         return None, None
-
-
-def _number(text: str) -> float | None:
-    try:
-        number = float(text)
-    except ValueError:
-        return None
-    return number if math.isfinite(number) else None
 
 
 def _moment(text: str, began_s: float) -> str:

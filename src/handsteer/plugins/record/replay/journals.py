@@ -1,10 +1,9 @@
 """The journals of a recording: what each node read from outside, spin by spin, and what gives it to a node again."""
 
 import json
-import math
 import threading
 from collections import OrderedDict, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
@@ -23,6 +22,8 @@ _MOST_READ_AHEAD = 400
 # A recorder's messages are at most some seconds behind the journal; pictures are large.
 _KEPT, _KEPT_PICTURES = 2000, 200
 _PICTURES = "sensor_msgs/msg/CompressedImage"
+# No stamp of ROS holds more; what is far larger cannot be converted to one.
+_END_OF_TIME_S = 2.0**31
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,18 @@ class Spin:
     is_stop: bool = False
 
 
+def clock_offset(about: Mapping[str, str]) -> float | None:
+    """Return what is added to a time in a journal to get its stamp, in seconds; None if it is missing or not a time.
+
+    Args:
+        about: The metadata of the recording.
+    """
+    try:
+        return _time(about.get("clock_offset_s", ""))
+    except ValueError:
+        return None
+
+
 def read_spins(file: Recording, node: str) -> Iterator[Spin]:
     """Yield the spins of the node named ``node``, first its construction, with the messages that it processed.
 
@@ -110,24 +123,29 @@ def parse_spin(recorded: Recorded) -> Spin:
     try:
         text = recorded.message.data
         entry = json.loads(text if len(text) <= _LONGEST_ENTRY else "")
-        readings = [float(time_s) for time_s in entry["t"]]
-        if not all(map(math.isfinite, readings)):
-            raise ValueError("a time that is not finite")
         return Spin(
             recorded.time_s,
-            readings,
+            [_time(reading) for reading in entry["t"]],
             [_got(*values) for values in entry.get("got", ())],
             {str(topic): int(count) for topic, count in entry.get("gave", {}).items()},
             dict(entry.get("saw", {})),
             entry.get("config"),
             bool(entry.get("stop")),
         )
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
         raise RecordingError(f"the journal {recorded.topic} is damaged at {recorded.time_s:.3f} s: {error}") from None
 
 
+def _time(value: Any) -> float:
+    """Return a time in seconds; raise a ValueError if it is not one."""
+    time_s = float(value)
+    if not abs(time_s) < _END_OF_TIME_S:  # nan is not
+        raise ValueError("a number that is not a time")
+    return time_s
+
+
 def _got(topic: Any, number: Any, captured_s: Any, is_late: Any, by_player: Any) -> Got:
-    captured = None if captured_s is None else float(captured_s)
+    captured = None if captured_s is None else _time(captured_s)
     return Got(str(topic), int(number), captured, bool(is_late), bool(by_player))
 
 

@@ -12,13 +12,13 @@ from typing import Any, Literal
 from pydantic import ValidationError
 
 from handsteer.config import Config
-from handsteer.errors import RecordingError
+from handsteer.errors import RecordingError, quoted
 from handsteer.making import cmd_vel_topic, make_control, make_recognition
 from handsteer.messages import CAMERA_CHANGED, CMD_VEL, GESTURE_JOY, HAND_SIGN, IMAGE_COMPRESSED
 from handsteer.nodes.base import Node
 from handsteer.nodes.journal import JOURNALS
 from handsteer.plugins.record.recorded import Recorded, Recording
-from handsteer.plugins.record.replay.journals import Got, ReplayClock, ReplayTransport, Spin, read_spins
+from handsteer.plugins.record.replay.journals import Got, ReplayClock, ReplayTransport, Spin, clock_offset, read_spins
 from handsteer.transports.base import Received
 from handsteer.transports.encoding import encode
 
@@ -179,7 +179,7 @@ def _first_number(file: Recording, topic: str) -> int:
 def _rerun(
     file: Recording, name: str, make: Callable[[ReplayTransport, ReplayClock], Node], outputs: _Outputs | None
 ) -> Iterator[Result]:
-    clock, transport = ReplayClock(_number(file, "clock_offset_s")), ReplayTransport()
+    clock, transport = ReplayClock(_clock_offset(file)), ReplayTransport()
     spins = read_spins(file, name)
     recorded = _RecordedOutputs(file, _OUTPUTS[name])
     first = next(spins, None)
@@ -281,8 +281,9 @@ def _config(file: Recording, values: dict[str, Any]) -> Config:
         raise RecordingError(f"{file.path}: parameters that were changed do not fit this version") from None
 
 
-def _number(file: Recording, name: str) -> float:
-    try:
-        return float(file.about.get(name, "0"))
-    except ValueError:
-        raise RecordingError(f"{file.path}: {name} is {file.about[name][:40]!r}, not a number") from None
+def _clock_offset(file: Recording) -> float:
+    name = "clock_offset_s"
+    offset_s = clock_offset(file.about) if name in file.about else 0.0
+    if offset_s is None:
+        raise RecordingError(f"{file.path}: {name}: {quoted(file.about[name])} is not a valid time in seconds")
+    return offset_s
