@@ -21,8 +21,10 @@ from handsteer.messages import (
     IMAGE_COMPRESSED,
     ODOM,
     STOP,
+    WORLD_MARKERS,
     Bool,
     Header,
+    MarkerArray,
     String,
     Time,
     Topic,
@@ -254,6 +256,15 @@ def test_damaged_messages_are_left_out_and_counted(tmp_path: Path) -> None:
     assert facts.commands == len(good)
     assert facts.duration_s < 5.0
     assert "5 messages are damaged, and were left out" in facts.problems
+
+
+@pytest.mark.parametrize("time_s", [0.5, 1.5], ids=["read at the end", "read in between"])
+def test_damaged_markers_are_left_out_and_counted(time_s: float, tmp_path: Path) -> None:
+    good = [*drives(times=2), (0.0, WORLD_MARKERS, MarkerArray(markers=[]))]
+    bad = (time_s, WORLD_MARKERS, b"\0\1\0\0\xff")
+    facts = facts_of(written(tmp_path / "drive.mcap", sorted([*good, bad], key=lambda message: message[0])))
+    assert facts.commands == 40
+    assert "1 messages are damaged, and were left out" in facts.problems
 
 
 def test_lost_messages_are_counted(recording: Path, tmp_path: Path) -> None:

@@ -2,7 +2,8 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -119,10 +120,16 @@ class _Reader:
             self._topics[recorded.topic] = self._handler(recorded)
         handle = self._topics[recorded.topic]
         if handle is not None:
-            try:
+            with self._damage_counted():
                 handle(recorded, recorded.time_s - self._began_s)
-            except RecordingError:
-                self._unreadable += 1
+
+    @contextmanager
+    def _damage_counted(self) -> Iterator[None]:
+        """Leave out a message that turns out to be damaged in this block."""
+        try:
+            yield
+        except RecordingError:
+            self._unreadable += 1
 
     def end(self) -> DriveFacts:
         """Return the facts.
@@ -139,7 +146,8 @@ class _Reader:
         self._stands.end(self._now_s)
         self._reasons.end(self._now_s - self._began_s)
         self._signs.end()
-        self._take_markers()
+        with self._damage_counted():
+            self._take_markers()
         facts.things = self._map.all()
         facts.duration_s = self._now_s - self._began_s
         self._robot.end()
