@@ -65,9 +65,11 @@ class Moments:
     at: Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")] = None
 
     def check(self) -> None:
-        """Raise a DatasetError if one was given without the other."""
+        """Raise a DatasetError if one was given without the other, or without a value."""
         if (self.from_ is None) != (self.at is None):
             raise DatasetError("--from needs --at and --at needs --from: a recording, and its moments in seconds")
+        if self.at is not None and not self.at:
+            raise DatasetError("--at needs a value: the seconds of each moment, as in --at 12.4")
 
 
 @loads("handsteer.plugins.teach.verbs.collecting")
@@ -172,6 +174,8 @@ def import_keypoints(
     from handsteer.plugins.teach.verbs.tables import dataset_table
     from handsteer.recognition.custom_signs import label_for
 
+    if not labels:
+        raise DatasetError("--labels needs a value: the number of a class and its sign, as in --labels 3=OK")
     check_writable("--dataset", dataset, DatasetError)
     known = load_dataset(dataset) if dataset.exists() else Dataset()
     listed = len(labels) == 1 and "=" not in labels[0]

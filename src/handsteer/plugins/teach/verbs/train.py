@@ -96,6 +96,8 @@ def train(
     from handsteer.plugins.teach.verbs.tables import teaching_tables
     from handsteer.recognition.custom_signs import load_custom_model, save_custom_model
 
+    if sided is not None and not sided:
+        raise TrainingError("--sided needs a value: the signs, as in --sided Hi")
     check_writable("--output", output, TrainingError, load_custom_model)
     parts = [load_dataset(path) for path in datasets or (_DATASET,)]
     takes = tuple(take for part in parts for take in part.takes)
