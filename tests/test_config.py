@@ -153,6 +153,8 @@ def test_old_names_still_count_with_one_warning(
         ("control:\n  mode: joystik\n", r"my\.yaml, line 2: control\.mode: 'joystik' .*: did you mean joystick\?"),
         ("control:\n  actions:\n    Hi: turbos\n", r"my\.yaml, line 3: control\.actions\.Hi: .*: did you mean turbo\?"),
         ("camera: 5\n", r"my\.yaml, line 1: camera: 5 should be"),
+        ("control:\n  robots:\n    - r1\n    - 7\n", r"my\.yaml, line 4: control\.robots\.1: 7 should be"),
+        ("control:\n  robots: [r1,\n    [r2]]\n", r"my\.yaml, line 3: control\.robots\.1: \['r2'\] should be"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_found_by_its_line(tmp_path: Path, text: str, says: str) -> None:
@@ -167,3 +169,6 @@ def test_the_file_is_not_blamed_for_an_option(tmp_path: Path) -> None:
     path.write_text("control:\n  max_linear: 1\n")
     with pytest.raises(ConfigError, match=r"^control\.max_linear: 99 should be"):
         load(path, None, {"control": {"max_linear": 99}})
+    path.write_text("control:\n  robots: [r1, r2]\n")
+    with pytest.raises(ConfigError, match=r"^control\.robots\.1: 7 should be"):
+        load(path, None, {"control": {"robots": ["r1", 7]}})

@@ -227,7 +227,10 @@ def _where(path: Path, of_file: dict[str, Any], overrides: Sequence[dict[str, An
 
 
 def _has(values: Any, place: tuple[str | int, ...]) -> bool:
+    """Return whether there is a value at ``place`` in ``values``, which are nested dictionaries and lists."""
     for part in place:
+        if isinstance(values, list):
+            values = dict(enumerate(values))
         if not isinstance(values, dict) or part not in values:
             return False
         values = values[part]
