@@ -23,6 +23,8 @@ def open_regular(path: Path, most_bytes: int | None = None) -> BinaryIO:
     Raises:
         OSError: It cannot be read, is not a regular file, or is larger; ``strerror`` is the reason, in words.
     """
+    if "\0" in str(path):  # Python raises a ValueError
+        raise OSError(errno.EINVAL, "its name contains a null character")
     # The flag is for named pipes; it has no effect on regular files.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     try:

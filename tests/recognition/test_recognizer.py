@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from handsteer.config import Config, SignsConfig
-from handsteer.errors import FrameError
+from handsteer.errors import CameraUnreadable, FrameError
 from handsteer.recognition.hand import Hand
 from handsteer.recognition.recognizer import Recognizer
 from handsteer.recognition.shipped_signs import ShippedClassifier, load_model
@@ -56,6 +56,11 @@ def test_a_broken_frame_raises(image: np.ndarray) -> None:
     stream = Recognizer(classifier=CLASSIFIER)
     with pytest.raises(FrameError):
         stream.step(image, 0.0)
+
+
+def test_a_name_that_no_photo_can_have_is_refused() -> None:
+    with pytest.raises(CameraUnreadable, match=r"cannot read the photo a.*: its name contains a null character"):
+        reading([[]]).recognize("a\0b")
 
 
 def test_a_sign_that_passes_by_does_not_count_until_the_hand_is_held_still() -> None:
