@@ -1,6 +1,7 @@
 """The spine without nodes: an image in, a velocity out."""
 
 import math
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from handsteer import Config, Recognizer, Teleop, Velocity
 from handsteer.cameras.files import SensorNoise
 from handsteer.clock import SteppedClock
 from handsteer.config import CameraConfig, ControlConfig, VirtualHandConfig
-from handsteer.errors import FrameError
+from handsteer.errors import ConfigError, FrameError, quoted
 from handsteer.graph import Graph
 from handsteer.images import bgr_image
 from handsteer.messages import CMD_VEL, IMAGE_RAW, Twist
@@ -48,6 +49,15 @@ class Person:
         """Show an open palm, then Forward, until it drives."""
         self.shows("Stop", 1.2)
         assert self.shows("Forward", 1.0)[-1].linear_mps > 0.1
+
+
+@pytest.mark.parametrize("made", [Recognizer, Teleop])
+@pytest.mark.parametrize("config", [3, {}, {"control": {"max_linear": 0.2}}, "my.yaml", ControlConfig(), 0, False])
+def test_what_is_not_a_config_is_refused(made: type[Recognizer | Teleop], config: Any) -> None:
+    with pytest.raises(
+        ConfigError, match=rf"^{re.escape(quoted(config))} is not a valid Config: give a Config, such as"
+    ):
+        made(config)
 
 
 def test_a_hand_that_is_up_at_the_start_moves_nothing_before_neutral_was_seen() -> None:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handsteer.config import Config
+from handsteer.config import Config, checked
 from handsteer.control import Control
 from handsteer.control.explain import Reason, seconds_to_renew, warned
 from handsteer.pipeline import FramePipeline, Sight
@@ -39,11 +39,12 @@ class Teleop:
         recognition: Result for the last image; None if it was not a new image.
 
     Raises:
+        ConfigError: ``config`` is something else, such as a dictionary.
         ModelError: A landmark model or the sign model is missing or broken.
     """
 
     def __init__(self, config: Config | None = None, recognizer: Recognizer | None = None) -> None:
-        config = config or Config()
+        config = checked(config)
         self.recognition: Recognition | None = None
         self._pipeline = FramePipeline(recognizer or Recognizer(config), config.joystick)
         self._max_frame_age_s = config.signs.max_frame_age

@@ -55,6 +55,7 @@ __all__ = [
     "TeachConfig",
     "VirtualHandConfig",
     "assist_of",
+    "checked",
     "cmd_vel_type",
     "describe",
     "live",
@@ -262,6 +263,20 @@ def validate(section: type[S], values: Any) -> S:
         return section.model_validate(values)
     except ValidationError as error:
         raise ConfigError(describe(error, section)) from None
+
+
+def checked(config: object) -> Config:
+    """Return ``config``; the defaults if None.
+
+    Raises:
+        ConfigError: It is something else, such as a dictionary.
+    """
+    if config is None:
+        return Config()
+    if not isinstance(config, Config):
+        example = "Config(control=ControlConfig(max_linear=0.3))"
+        raise ConfigError(f"{quoted(config)} is not a valid Config: give a Config, such as {example}")
+    return config
 
 
 def describe(error: ValidationError, section: type[Section] | None = None) -> str:

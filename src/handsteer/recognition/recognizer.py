@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handsteer import doors
-from handsteer.config import Config, SignsConfig
+from handsteer.config import Config, SignsConfig, checked
 from handsteer.recognition.custom_signs import CustomClassifier, load_custom_model
 from handsteer.recognition.filters import Debouncer, Evidence, HandPosition, HandSelector, OpinionTimes
 from handsteer.recognition.hand import Classifier, Hand, Landmarker, SignGuess
@@ -96,6 +96,7 @@ class Recognizer:
         classifier: Recognises the sign of a hand; opened from ``config.signs`` if None.
 
     Raises:
+        ConfigError: ``config`` is something else, such as a dictionary.
         ModelError: A landmark model or the sign model is missing or broken.
     """
 
@@ -106,7 +107,7 @@ class Recognizer:
         landmarker: Landmarker | None = None,
         classifier: Classifier | None = None,
     ) -> None:
-        config = config or Config()
+        config = checked(config)
         self._landmarker = landmarker or open_landmarker(config)
         self._classifier = classifier or open_classifier(config.signs)
         self._filter = Debouncer(config.signs)
