@@ -200,6 +200,18 @@ def test_an_action_that_fails_stops_the_robot(
     assert caplog.text.count("the action breaks has failed: the robot stops") <= 1
 
 
+def test_an_action_that_failed_moves_nothing_before_a_sign_that_stops(installed: Installed) -> None:
+    from handsteer.control.sign_control import SignControl  # noqa: PLC0415
+
+    body = "if not now.is_zero:\n            raise ValueError\n        return type(now)(0.3, 0.0)"
+    installed.add("sometimes", FAILING.format(body=body), actions="breaks = Breaks")
+    control = SignControl(Config().control.model_copy(update={"actions": {"Go": "breaks"}}))
+    assert [control.step("Go", 0.03) for _ in range(4)] == [Velocity(0.3, 0.0), *[Velocity()] * 3]
+    assert control.step("Forward", 0.03) == Velocity()
+    assert control.step("Stop", 0.03) == Velocity()
+    assert control.step("Go", 0.03) == Velocity(0.3, 0.0)
+
+
 @pytest.mark.slow
 def test_an_action_is_known_by_the_command_line(installed: Installed) -> None:
     installed.add("crawling", example("Action"), actions="crawl = Crawl")

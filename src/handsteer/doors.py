@@ -49,7 +49,8 @@ class SignAction(Protocol):
     def velocity(self, now: "Velocity", since_last_s: float) -> "Velocity":
         """Return the velocity to command for one message with the sign; the limits of the control apply to it.
 
-        It is called on the control's thread, so it must return at once. The robot stops if it raises.
+        It is called on the control's thread, so it must return at once. If it raises, the robot stops, and
+        nothing moves before a sign that stops.
 
         Args:
             now: The velocity that is commanded so far.

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from handsteer import doors
 from handsteer.errors import PLUGIN_FAILURES, PluginError
-from handsteer.types import ACTIONS, ZERO, Velocity
+from handsteer.types import ACTIONS, Velocity
 
 log = logging.getLogger(__name__)
 
@@ -31,16 +31,16 @@ class AddedActions:
                 reason = f"{type(error).__name__}: {error}"
                 raise PluginError(f"{doors.ACTIONS.described(name)} cannot be made: {reason}") from error
 
-    def velocity(self, name: str, now: Velocity, since_last_s: float) -> Velocity:
-        """Return the velocity that the action ``name`` wants; zero if it fails, which is logged once for each cause.
+    def velocity(self, name: str, now: Velocity, since_last_s: float) -> Velocity | None:
+        """Return the velocity that the action ``name`` wants; None if it fails, which is logged once for each cause.
 
         The other arguments are the action's.
         """
         try:
             wanted = self._made[name].velocity(now, since_last_s)
-            return wanted if wanted.is_finite else ZERO
+            return wanted if wanted.is_finite else None
         except PLUGIN_FAILURES as error:
             if (name, type(error)) not in self._failed:
                 self._failed.add((name, type(error)))
                 log.exception("the action %s has failed: the robot stops", name)
-            return ZERO
+            return None

@@ -20,7 +20,8 @@ class SignControl:
     itself is clamped, so that it does not wind up beyond the limits.
 
     A ``turbo`` sign doubles the linear velocity, within the limit, while it is shown, and keeps the angular one. The
-    next sign continues from the original velocity. A stopped robot remains stopped.
+    next sign continues from the original velocity. A stopped robot remains stopped. After an action of a plug-in has
+    failed, nothing moves before a sign that stops.
 
     Raises:
         PluginError: An action of ``config.actions`` is of a plug-in, and cannot be made.
@@ -36,6 +37,7 @@ class SignControl:
         self._allowance = Allowance(config.max_sign_rate)
         self._added = AddedActions()
         self._added.make(config.actions.values())
+        self._has_failed = False
         self.velocity = ZERO
         self.silent = True
 
@@ -62,11 +64,8 @@ class SignControl:
         self._since_sign_s = 0.0
         self.silent = False
         action = action_of(sign, self._config.actions)
-        self.velocity = (
-            self._next(action, interval_s)
-            if action in ACTIONS
-            else self._allowed(self._added.velocity(action, self.velocity, interval_s))
-        )
+        self._has_failed = self._has_failed and action != "stop"
+        self.velocity = ZERO if self._has_failed else self._after(action, interval_s)
         commanded = self._boosted() if action == "turbo" else self.velocity
         return commanded if commanded.is_finite else self.halt()
 
@@ -88,6 +87,13 @@ class SignControl:
         self.silent = True
         self._since_sign_s = 0.0
         return None if was_silent else ZERO
+
+    def _after(self, action: str, interval_s: float) -> Velocity:
+        if action in ACTIONS:
+            return self._next(action, interval_s)
+        wanted = self._added.velocity(action, self.velocity, interval_s)
+        self._has_failed = wanted is None
+        return ZERO if wanted is None else self._allowed(wanted)
 
     def _next(self, action: Action, interval_s: float) -> Velocity:
         now = self.velocity
