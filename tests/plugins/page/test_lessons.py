@@ -68,7 +68,7 @@ class School:
             cast(Graph, self),
             lambda: (RecordedLandmarker([[hand] for hand in hands] * 1000), open_classifier(Config().signs)),
         )
-        self.refuses = False
+        self.refuses = self.camera_is_lost = False
         self._ended = threading.Event()
         self._camera = threading.Thread(target=self._publish)
         self._camera.start()
@@ -83,6 +83,8 @@ class School:
         for number in itertools.count():
             if self._ended.wait(0.005):
                 return
+            if self.camera_is_lost:
+                continue
             header = Header(self.clock.stamp(self.clock.now()), "camera")
             images.publish(image_message(IMAGE, header), number * 0.05)
 
@@ -364,6 +366,19 @@ def test_no_take_has_hands_from_before_and_after_the_sides_are_swapped(school: S
     seen = View(flip=True).hand(sided.hand)
     hands = [hand for each in own(school).takes for hand in each.take.hands]
     assert all(np.allclose(hand.pixels, seen.pixels) for hand in hands)
+
+
+def test_a_take_ends_with_the_picture_and_does_not_go_on_with_the_next_one(school: School) -> None:
+    lesson = begin(school)
+    key = own(school).key
+    lesson.do(lambda of: of.record(key, hold=True))
+    school.wait_until(lambda: lesson.state.status.hands > 2)
+    school.camera_is_lost = True
+    school.wait_until(lambda: lesson.state.recorded is None)
+    assert lesson.state.hint == "No picture comes from the camera."
+    school.camera_is_lost = False
+    school.wait_until(lambda: lesson.state.seen is not None)
+    assert (lesson.state.recorded, collected(school)) == (None, 0)
 
 
 def test_what_is_no_name_of_a_person_is_refused(school: School) -> None:

@@ -27,6 +27,8 @@ log = logging.getLogger(__name__)
 
 _WATCH_PERIOD_S: Final = 0.2
 _NO_FRAME_S: Final = 1.0
+# Longer: a picture may take as long on a slow machine, and then the take is good.
+_LOST_S: Final = 3.0
 _UNATTENDED_S: Final = 1.0
 _LONGEST_STEP_S: Final = 0.5
 _NOTHING: Final = SignGuess(NONE, 0.0)
@@ -156,6 +158,8 @@ class LessonNode(Node):
         confidences = {sign: classifier.confidence(sign, chance) for sign, chance in guess.likelihoods.items()}
         with self._lock:
             self._lesson.see(hand, guess, confidences, step_s)
+        # Now, because a hand is looked for meanwhile: the camera is not lost then.
+        self._last_frame_s = self.clock.now()
 
     def _as_recognised(self, image: NDArray[np.uint8], landmarker: Landmarker) -> NDArray[np.uint8]:
         """Return ``image`` as the recognition gets it, so that it finds in it what is taught."""
@@ -171,7 +175,9 @@ class LessonNode(Node):
     def _watch(self) -> None:
         now = self.clock.now()
         with self._lock:
-            if now - self._attended_s > _UNATTENDED_S and self.state.recorded is not None:
+            # Another person may be in view when the page, or the picture, is back.
+            is_alone = now - self._attended_s > _UNATTENDED_S or now - self._last_frame_s > _LOST_S
+            if is_alone and self.state.recorded is not None:
                 self._lesson.pause()
             if now - self._last_frame_s > _NO_FRAME_S:
                 self._lesson.lose_frames()
