@@ -187,7 +187,7 @@ class HandSignRecognitionNode(Node):
         neutral: a hand that is held still may now show a sign that it did not show before.
         """
         has_other_models = self._has_other_models(config.signs)
-        if has_other_models or config.signs != self._config:
+        if has_other_models or _read_by(config.signs) != _read_by(self._config):
             pause_s = max(config.control.sign_timeout, _SILENCE_PERIOD_S) + _CHANGED_MARGIN_S
             self._changed_until_s = self.clock.now() + pause_s
             self._forget()
@@ -441,6 +441,11 @@ def _many_cameras(topic: str, cameras: Sequence[str]) -> str:
 
 
 _GONE = (-1, -1)
+
+
+def _read_by(config: SignsConfig) -> dict[str, Any]:
+    """Return the parameters that can change while the node runs; others of a configuration need not be its own."""
+    return config.model_dump(include=set(config.live))
 
 
 def _versions_of(config: SignsConfig) -> list[tuple[Path, int, int] | None]:
