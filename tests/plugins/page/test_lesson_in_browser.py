@@ -2,13 +2,14 @@
 
 import threading
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from playwright.sync_api import Locator, ViewportSize
+from playwright.sync_api import Locator, TimeoutError, ViewportSize
 
 from handsteer.cameras import freshness
 from handsteer.cameras.files import video_frames
@@ -26,6 +27,7 @@ pytestmark = NEEDS_A_BROWSER
 TRAINING_MS = 5 * PATIENCE_MS
 EMPTY_FRAMES = 60
 MOST_CLICKS = 8
+PRESSES = 5
 
 
 @pytest.fixture
@@ -79,10 +81,15 @@ def begin(visit: Visit, name: str) -> Locator:
 
 
 def hold(visit: Visit, card: Locator) -> None:
-    """Record a take of a second or so while the button is held."""
+    """Record a take of a second or so while the button is held; a card that moves at that moment is pressed again."""
     count = card.locator(".take").count()
-    card.locator(".hold").hover()
-    visit.page.mouse.down()
+    for _ in range(PRESSES):
+        card.locator(".hold").hover()
+        visit.page.mouse.down()
+        with suppress(TimeoutError):
+            visit.page.locator(".countdown").wait_for(timeout=PATIENCE_MS / PRESSES)
+            break
+        visit.page.mouse.up()
     wait_for_hands(visit)
     visit.page.mouse.up()
     card.locator(".take").nth(count).wait_for()
