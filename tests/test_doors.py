@@ -14,10 +14,13 @@ from typing import Any
 import pytest
 
 from handsteer import doors
+from handsteer.cameras import Camera
 from handsteer.clock import SteppedClock
 from handsteer.config import Config
 from handsteer.errors import PluginError
 from handsteer.graph import Graph
+from handsteer.recognition.hand import Classifier
+from handsteer.robots import Robot
 from handsteer.types import Velocity
 from tests.contracts.node_contract import VIRTUAL
 from tests.processes import START_S
@@ -297,6 +300,13 @@ def test_what_is_opened_is_what_the_door_is_for(installed: Installed) -> None:
         doors.ROBOTS.open("half", Config(), SteppedClock())
     with pytest.raises(PluginError, match=r"^the camera none of halves is of type NoneType without name, period_s,"):
         doors.CAMERAS.open("none", Config(), SteppedClock())
+
+
+@pytest.mark.parametrize(
+    ("door", "protocol"), [(doors.CAMERAS, Camera), (doors.ROBOTS, Robot), (doors.CLASSIFIERS, Classifier)]
+)
+def test_a_door_needs_all_of_its_protocol(door: doors.Door[Any], protocol: type) -> None:
+    assert set(door._needs) == {name for name in vars(protocol) if not name.startswith("_")}
 
 
 def test_what_exits_while_it_is_opened_is_reported(installed: Installed) -> None:
