@@ -114,7 +114,7 @@ class LiveError(HandsteerError):
 
 
 class PluginError(HandsteerError):
-    """A plug-in is not installed, or cannot be loaded."""
+    """A plug-in is not installed, or cannot be loaded or used."""
 
 
 PLUGIN_FAILURES: Final = (Exception, SystemExit)

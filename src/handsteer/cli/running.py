@@ -46,23 +46,19 @@ def exit_code(call: Callable[[], int | None]) -> int:
     except HandsteerError as error:
         return fail(str(error))
     except BrokenPipeError:  # the reader of the output has ended, as `head` does
-        _discard_output()
+        _discard(sys.stdout)
         return _READER_HAS_LEFT
     except OSError as error:
         if error.errno in _NOT_ALLOWED and error.filename is not None:
             return fail(f"cannot use {quoted(error.filename)}: {error.strerror}")
         if error.errno not in _NO_SPACE:
             raise
-        _discard_output()
+        _discard(sys.stdout)
         return fail(f"cannot write the output: {error.strerror}")
 
 
-def _discard_output() -> None:
-    """Discard what was not written yet to standard output: Python's last steps would try again, and fail."""
-    _discard(sys.stdout)
-
-
 def _discard(stream: TextIO) -> None:
+    """Discard what was not written yet to ``stream``: Python's last steps would try again, and fail."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 

@@ -181,7 +181,7 @@ class CalibrationNode(Node):
             self._landmarker = self._open_hands()
         image = bgr_image(received.message)
         self.see(largest(self._landmarker.detect(mirrored(image) if self._swap else image)), step_s)
-        # Now, because a hand is looked for meanwhile, for long on a slow machine: the camera is not lost then.
+        # After the detection, which can take long on a slow machine: the camera is not lost then.
         self._looked_s = self.clock.now()
 
     def _watch(self) -> None:

@@ -158,7 +158,7 @@ class LessonNode(Node):
         confidences = {sign: classifier.confidence(sign, chance) for sign, chance in guess.likelihoods.items()}
         with self._lock:
             self._lesson.see(hand, guess, confidences, step_s)
-        # Now, because a hand is looked for meanwhile: the camera is not lost then.
+        # After the detection, which can take long on a slow machine: the camera is not lost then.
         self._last_frame_s = self.clock.now()
 
     def _as_recognised(self, image: NDArray[np.uint8], landmarker: Landmarker) -> NDArray[np.uint8]:

@@ -128,7 +128,7 @@ class Lessons:
                     lesson.add_dataset(dataset, None)  # of another program, since then
             self._draft = None
             graph = self._graph
-            # Asked again for each frame, because it can change meanwhile.
+            # Read for each frame, because the parameter can change during the lesson.
             node = LessonNode(graph.transport, graph.clock, lesson, self._open_models, lambda: self.signs.swap_sides)
             self._current = _Current(viewer, node, read)
             node.start()
