@@ -721,8 +721,33 @@ def test_two_cameras_on_one_topic_are_logged_and_one_on_each_is_not(caplog: pyte
     bench = RecognitionBench()
     others: list[Any] = [bench.transport.advertise("front", IMAGE_COMPRESSED)]
     bench.run(10.0)
-    assert not caplog.records
+    assert not [record for record in caplog.records if "publishers" in record.message]
     others.append(bench.transport.advertise("intruder", IMAGE_RAW))
     bench.run(10.0)
-    (line,) = [record.message for record in caplog.records]
+    (line,) = [record.message for record in caplog.records if "publishers" in record.message]
     assert "/image_raw has 2 publishers (camera, intruder), and signs are recognised in the images of all" in line
+
+
+def test_a_topic_without_images_is_logged_once_until_one_comes(caplog: pytest.LogCaptureFixture) -> None:
+    bench = RecognitionBench()
+    bench.run(20.0)
+    silence = "no image on /image_raw for 5 s, from camera"
+    assert caplog.messages == [silence]
+    bench.show(frames=6)
+    bench.run(4.5)
+    assert caplog.messages == [silence]
+    bench.run(1.0)
+    assert caplog.messages == [silence] * 2
+    RecognitionBench(SignsConfig(image_transport="compressed")).run(6.0)
+    assert caplog.messages[2:] == ["no image on /image_raw/compressed for 5 s, as no node publishes it"]
+
+
+def test_a_node_that_is_deactivated_misses_no_images(caplog: pytest.LogCaptureFixture) -> None:
+    bench = RecognitionBench()
+    bench.node.set_active(False)
+    bench.run(20.0)
+    bench.node.set_active(True)
+    bench.run(4.5)
+    assert caplog.messages == []
+    bench.run(1.0)
+    assert len(caplog.messages) == 1

@@ -75,6 +75,8 @@ _CHANGED_MARGIN_S = 0.1
 _BESIDE_PLAYER = "old frames do not count while a recording is played next to another publisher of the same topic"
 
 _FREEZE_EXPLAINED_S = 3.0
+_SILENCE_LOGGED_S = 5.0
+"""A webcam that is opened takes up to a few seconds."""
 # An older refusal no longer explains why there are no frames.
 _REFUSAL_SHOWN_S = 10.0
 _FROZEN = (
@@ -136,7 +138,8 @@ class HandSignRecognitionNode(Node):
         self._stall_guard = StallGuard(config.max_frame_age, clock.now())
         self._recording, self._played = Recording(config.recorded), PlayedTime(config.max_frame_age)
         self._refused: str | None = None
-        self._has_explained_freeze = False
+        self._has_explained_freeze = self._has_logged_silence = False
+        self._activated_s = clock.now()
         self._refused_s = -math.inf
         self._recognition: Recognition | None = None
         self._camera_since_s = self._changed_until_s = -math.inf
@@ -371,12 +374,24 @@ class HandSignRecognitionNode(Node):
         has_played = now - self._last_played_s <= PLAYED_S
         if now - self._last_played_s > _REPORT_PLAYED_S:
             self._played.report()
+        if self.is_active:
+            self._log_silence(now)
         if not self.is_active or has_played or now - self._last_frame_s <= self._config.max_frame_age:
             return
         period_s = _SILENCE_PERIOD_S if self._recognition is None else self._config.max_frame_age
         if now - self._last_sign_s > period_s:
             self._last_sign_s = now
             self._publish_none(now)
+
+    def _log_silence(self, now_s: float) -> None:
+        last_s = max(self._last_frame_s, self._refused_s, self._last_played_s, self._activated_s)
+        is_silent = now_s - last_s > _SILENCE_LOGGED_S
+        if is_silent and not self._has_logged_silence:
+            topic = self._jpegs if self._compressed else self._frames
+            name, cameras = self.transport.topic_name(topic), self.transport.publishers_of(topic)
+            who = f"from {', '.join(cameras)}" if cameras else "as no node publishes it"
+            log.warning("no image on %s for %.0f s, %s", name, now_s - last_s, who)
+        self._has_logged_silence = is_silent
 
     def _publish_none(self, now_s: float) -> None:
         self._forget()
@@ -386,6 +401,7 @@ class HandSignRecognitionNode(Node):
 
     def on_activate(self) -> None:
         """Begin with the next frame."""
+        self._activated_s = self.clock.now()
         self._played.end()
         self._pipeline.begin_again()
 
