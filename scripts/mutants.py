@@ -31,7 +31,7 @@ ROOT: Final = Path(__file__).resolve().parents[1]
 SOURCES: Final = ROOT / "src" / "handsteer"
 TABLE: Final = ROOT / "tests" / "mutants.toml"
 FEWEST: Final = 60
-PARTS: Final = 3
+PARTS: Final = 4
 """``--day`` takes one part of so many."""
 
 INDIRECT: Final = ("test_histories.py", "test_stateful.py", "test_auditing.py", "test_audit.py", "mutants")
@@ -126,7 +126,7 @@ def part_of_day(mutants: Sequence[Mutant], day: datetime.date) -> list[Mutant]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--day", type=datetime.date.fromisoformat, help="only the third of this day, as 2026-11-24")
+    parser.add_argument("--day", type=datetime.date.fromisoformat, help="only the quarter of this day, as 2026-11-24")
     parser.add_argument("--only", default="", metavar="TEXT", help="only rows with this text in guard, file or tests")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), metavar="N")
     parser.add_argument("--verbose", action="store_true", help="print by what each mutant died")

@@ -1,6 +1,7 @@
 """What tests share: where the real photos and clips are, and a ROS 1 graph."""
 
 import atexit
+import datetime
 import faulthandler
 import importlib.util
 import os
@@ -67,6 +68,11 @@ UNTIL_S = {
 }
 """So long after the start of the tests, those with a marker are skipped: CI has to end on a slow machine too. What is
 exhaustive goes first: it tries every case of what others try once."""
+
+SLOW_DAY = os.environ.get("HANDSTEER_SLOW_DAY")
+"""A date, as 2026-11-24: only its part of the slow and exhaustive tests is run, as in CI. Without it all are."""
+SLOW_PARTS = 4
+"""Each of these tests is run on one of so many successive days, and on each day a part of every long file of tests."""
 
 # Of the process that all others are started by.
 _STARTED_S = float(os.environ.setdefault("HANDSTEER_TESTS_STARTED_S", str(time.monotonic())))
@@ -144,6 +150,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.flaky(reruns=reruns, reruns_delay=3))
         ranks[_group(item)] = max(ranks.get(_group(item), 0), _rank(item))
     items.sort(key=lambda item: (-ranks[_group(item)], _group(item), _is_exhaustive(item)))
+    if SLOW_DAY:
+        for number, item in enumerate(item for item in items if any(map(item.get_closest_marker, UNTIL_S))):
+            if not is_of_day(number, SLOW_DAY):
+                item.add_marker(pytest.mark.skip(reason="left out, as it is slow: a test of another day"))
+
+
+def is_of_day(number: int, day: str) -> bool:
+    """Return whether the slow test of this number is run on ``day``."""
+    return number % SLOW_PARTS == datetime.date.fromisoformat(day).toordinal() % SLOW_PARTS
 
 
 def _group(item: pytest.Item) -> str:

@@ -1,4 +1,4 @@
-"""The table of guards is valid; ``make mutants`` breaks each, and ``make test-all`` a third of them."""
+"""The table of guards is valid; ``make mutants`` breaks each, and ``make test-all`` a quarter of them."""
 
 import datetime
 from dataclasses import replace
