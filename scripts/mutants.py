@@ -175,6 +175,7 @@ class _Run:
             _link(tree, self.mutant)
             sys.path.insert(0, str(tree))
             os.environ["PYTHONPATH"] = str(tree)
+            os.environ.pop("HANDSTEER_SLOW_DAY", None)  # a test that is named here is run on any day
             # What tests leave behind goes with the folder.
             os.environ["TMPDIR"] = tempfile.tempdir = str(self.folder)
             os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = str(self.folder / "hypothesis")
