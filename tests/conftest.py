@@ -39,6 +39,7 @@ RUN_AGAIN = (
     "tests/faults/test_networks.py",
     "tests/faults/test_processes.py",
     "tests/plugins/foxglove",
+    "tests/plugins/ros1",
     "tests/rmw_zenoh",
     "tests/ros1",
     "tests/ros2",
@@ -47,9 +48,9 @@ RUN_AGAIN = (
     "tests/test_wheel.py",
     "tests/transports",
 )
-"""Where a slow test that fails is run once more, one with a browser twice more: these drive real processes in real
-time, which a machine that is busy with other things may upset. What is wrong fails each time; the last line of a run
-counts what was run again."""
+"""Where a test that is slow, or needs ROS 1, and fails is run once more, one with a browser twice more: these drive
+real processes in real time, which a machine that is busy with other things may upset. What is wrong fails each time;
+the last line of a run counts what was run again."""
 
 LONG_VALUE = 100
 """Longer texts, in characters, are not part of a test's name."""
@@ -145,7 +146,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.xdist_group(group))
         if set(getattr(item, "fixturenames", ())) & _NETWORKS:
             item.add_marker(pytest.mark.netns)
-        if item.get_closest_marker("slow") and item.nodeid.startswith(RUN_AGAIN):
+        if any(map(item.get_closest_marker, ("slow", "ros1"))) and item.nodeid.startswith(RUN_AGAIN):
             reruns = 2 if item.get_closest_marker("browser") else 1  # drawn in software, next to other tests
             item.add_marker(pytest.mark.flaky(reruns=reruns, reruns_delay=3))
         ranks[_group(item)] = max(ranks.get(_group(item), 0), _rank(item))
