@@ -63,13 +63,10 @@ HANGS_S = 960.0
 was, and goes on with the others in another process. Longer than any timeout of pytest-timeout, which interrupts the
 function of a test, once: neither its fixtures, nor what the function does at its end."""
 
-UNTIL_S = {
-    "exhaustive": float(os.environ.get("HANDSTEER_EXHAUSTIVE_UNTIL_S", "inf")),
-    "slow": float(os.environ.get("HANDSTEER_SLOW_UNTIL_S", "inf")),
-}
-"""So long after the start of the tests, those with a marker are skipped: CI has to end on a slow machine too. What is
-exhaustive goes first: it tries every case of what others try once."""
-
+SLOW = ("slow", "exhaustive")
+"""Marks of what CI does not always run; what is exhaustive tries every case of what others try once."""
+SLOW_UNTIL_S = float(os.environ.get("HANDSTEER_SLOW_UNTIL_S", "inf"))
+"""So long after the start of the tests, these are skipped: CI has to end on a slow machine too."""
 SLOW_DAY = os.environ.get("HANDSTEER_SLOW_DAY")
 """A date, as 2026-11-24: only its part of the slow and exhaustive tests is run, as in CI. Without it all are."""
 SLOW_PARTS = 4
@@ -152,7 +149,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         ranks[_group(item)] = max(ranks.get(_group(item), 0), _rank(item))
     items.sort(key=lambda item: (-ranks[_group(item)], _group(item), _is_exhaustive(item)))
     if SLOW_DAY:
-        for number, item in enumerate(item for item in items if any(map(item.get_closest_marker, UNTIL_S))):
+        for number, item in enumerate(item for item in items if any(map(item.get_closest_marker, SLOW))):
             if not is_of_day(number, SLOW_DAY):
                 item.add_marker(pytest.mark.skip(reason="left out, as it is slow: a test of another day"))
 
@@ -200,9 +197,8 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     there = importlib.util.find_spec("rospy") and shutil.which("roscore")
     if item.get_closest_marker("ros1") and not there:
         pytest.skip("ROS 1 is not installed: make ros1")
-    for marker, until_s in UNTIL_S.items():
-        if item.get_closest_marker(marker) and time.monotonic() - _STARTED_S > until_s:
-            pytest.skip(f"left out, as it is {marker}: the tests have run for {until_s:g} s")
+    if any(map(item.get_closest_marker, SLOW)) and time.monotonic() - _STARTED_S > SLOW_UNTIL_S:
+        pytest.skip(f"left out, as it is slow: the tests have run for {SLOW_UNTIL_S:g} s")
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
