@@ -53,6 +53,16 @@ void sleep_for(unsigned seconds) {
 }
 """
 
+CLOCK = """
+import ctypes, sys
+from handsteer.clock import RealClock
+
+clock = RealClock()
+before_s = clock.now()
+ctypes.CDLL(sys.argv[1]).sleep_for(1)
+print(clock.now() - before_s)
+"""
+
 DRIVE = r"""
 import ctypes, sys, time
 from handsteer.config import Config, VirtualHandConfig
@@ -72,14 +82,29 @@ with Graph(Config(virtual_hand=VirtualHandConfig(script="Stop:2 Forward:600"))) 
 """
 
 
-def test_after_a_sleep_neutral_has_to_be_seen(tmp_path: Path) -> None:
+@pytest.fixture
+def library(tmp_path: Path) -> Path:
+    """SLEEP, compiled."""
     source, library = tmp_path / "sleep.c", tmp_path / "sleep.so"
     source.write_text(SLEEP)
     subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source], check=True)
-    command = [sys.executable, "-c", DRIVE, str(library)]
+    return library
+
+
+def run(program: str, library: Path) -> float:
+    """Return the number that a program prints whose sleep is that of the library."""
+    command = [sys.executable, "-c", program, str(library)]
     environment = {**os.environ, "LD_PRELOAD": str(library)}
     done = subprocess.run(
-        command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
+        command, env=environment, cwd=library.parent, capture_output=True, text=True, timeout=300, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert float(done.stdout) < 0.001
+    return float(done.stdout)
+
+
+def test_time_in_which_the_machine_sleeps_counts(library: Path) -> None:
+    assert run(CLOCK, library) >= 1.0
+
+
+def test_after_a_sleep_neutral_has_to_be_seen(library: Path) -> None:
+    assert run(DRIVE, library) < 0.001
