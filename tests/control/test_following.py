@@ -21,6 +21,14 @@ def test_a_robot_whose_odometry_stops_is_not_there() -> None:
     assert following.step(0.02, Velocity(0.5, 0.0)) is None
 
 
+def test_what_has_come_since_the_last_step_is_no_older() -> None:
+    following = Following()
+    following.note(Velocity(0.5, 0.0), since_step_s=1.5)
+    assert following.step(1.5, Velocity(0.5, 0.0)) is None
+    assert following.step(0.35, Velocity(0.5, 0.0)) is None
+    assert following.step(0.06, Velocity(0.5, 0.0)) == "the robot's odometry has stopped"
+
+
 @pytest.mark.parametrize("checks_motion", [True, False])
 def test_a_robot_whose_odometry_has_never_been_a_number_is_not_there(checks_motion: bool) -> None:
     following = Following(checks_motion=checks_motion)

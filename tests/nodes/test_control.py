@@ -792,6 +792,17 @@ def test_odometry_whose_pose_is_not_a_number_counts_as_none(where: str, *, stand
     assert bench.control._report().message.endswith("to begin (the robot's odometry has stopped)")
 
 
+def test_odometry_that_comes_while_the_node_starts_has_not_stopped() -> None:
+    """To subscribe takes seconds on a busy machine."""
+    bench = ControlBench()
+    bench.clock.advance(1.5)
+    odom = bench.transport.advertise("robot", ODOM)
+    odom.publish(odometry(twist(0.0, 0.0), bench.clock.stamp(1.0 + bench.clock.now())))
+    bench.run(0.01)
+    bench.show(*["Forward"] * 10)
+    assert bench.last()[0] > 0.0
+
+
 def test_nothing_ramps_while_no_robot_listens() -> None:
     bench = Bench()
     bench.nodes = [HandSignControlNode(bench.transport, bench.clock, ControlConfig())]

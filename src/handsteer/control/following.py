@@ -30,11 +30,16 @@ class Following:
         self._follows: Velocity | None = None
         self._opposition = (_Opposition(0.15, 0.1), _Opposition(0.4, 0.25))
 
-    def note(self, measured: Velocity) -> None:
-        """Record a velocity from odometry; one that is not finite only shows that there should be some."""
+    def note(self, measured: Velocity, since_step_s: float = 0.0) -> None:
+        """Record a velocity from odometry; one that is not finite only shows that there should be some.
+
+        Args:
+            measured: What the robot does now.
+            since_step_s: Time since the last :meth:`step`, in seconds, which the next one adds.
+        """
         if measured.is_finite:
             self._measured = measured
-            self._age_s = 0.0
+            self._age_s = -since_step_s
         elif self._measured is None:
             self._measured = ZERO
 

@@ -306,8 +306,9 @@ class HandSignControlNode(Node):
         if self._repeats.has(received.message.header.stamp, self.clock.now()):
             return  # it says nothing of now: a robot that hangs is as silent
         measured = self._measured.read(received.message)
-        self._following.note(self._commanded if measured is None else measured)
-        self._moved = (self.clock.now(), measured is None or not measured.is_rest)
+        now = self.clock.now()
+        self._following.note(self._commanded if measured is None else measured, now - self._last_step_s)
+        self._moved = (now, measured is None or not measured.is_rest)
 
     def _watch(self) -> None:
         elapsed_s = self._elapsed()
