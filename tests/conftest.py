@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from _pytest.faulthandler import fault_handler_stderr_fd_key
@@ -21,6 +22,7 @@ from handsteer.config import DEFAULT_FILE, Config, VirtualHandConfig
 from handsteer.graph import Graph
 from tests.reasons import check_made, watch_recordings
 from tests.ros1.graph import Ros1Graph, ros1_graph
+from tests.turns import Turns
 
 for contract in ("camera", "robot", "transport"):
     pytest.register_assert_rewrite(f"handsteer.testing.{contract}_contract")
@@ -38,7 +40,9 @@ RUN_AGAIN = (
     "tests/distributed",
     "tests/faults/test_networks.py",
     "tests/faults/test_processes.py",
+    "tests/faults/test_sleep.py",
     "tests/plugins/foxglove",
+    "tests/plugins/record",
     "tests/plugins/ros1",
     "tests/rmw_zenoh",
     "tests/ros1",
@@ -49,8 +53,8 @@ RUN_AGAIN = (
     "tests/transports",
 )
 """Where a test that is slow, or needs ROS 1, and fails is run once more, one with a browser twice more: these drive
-real processes in real time, which a machine that is busy with other things may upset. What is wrong fails each time;
-the last line of a run counts what was run again."""
+real processes in real time, which a machine that is busy with other things may upset, so that they are then run
+alone. What is wrong fails each time; the last line of a run counts what was run again."""
 
 LONG_VALUE = 100
 """Longer texts, in characters, are not part of a test's name."""
@@ -71,6 +75,8 @@ SLOW_DAY = os.environ.get("HANDSTEER_SLOW_DAY")
 """A date, as 2026-11-24: only its part of the slow and exhaustive tests is run, as in CI. Without it all are."""
 SLOW_PARTS = 4
 """Each of these tests is run on one of so many successive days, and on each day a part of every long file of tests."""
+
+_TURNS = pytest.StashKey[Turns]()
 
 # Of the process that all others are started by.
 _STARTED_S = float(os.environ.setdefault("HANDSTEER_TESTS_STARTED_S", str(time.monotonic())))
@@ -121,10 +127,18 @@ atexit.register(shutil.rmtree, os.environ["XDG_STATE_HOME"], ignore_errors=True)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
-def pytest_configure() -> None:
+def pytest_configure(config: pytest.Config) -> None:
     """Refuse to start where ``handsteer run`` would read a file of parameters that is not the tests'."""
     if DEFAULT_FILE.exists():
         raise pytest.UsageError(f"move {DEFAULT_FILE.absolute()} away: the runs of the tests would read it")
+    if workerinput := getattr(config, "workerinput", None):
+        config.stash[_TURNS] = Turns(Path(workerinput["handsteer_turns"]))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Tell each process of a parallel run where its locks are: in a folder of the first process, which removes it."""
+    node.workerinput["handsteer_turns"] = os.environ["XDG_STATE_HOME"]
 
 
 @pytest.hookimpl(tryfirst=True)  # pytest-xdist reads the groups in the same hook
@@ -145,7 +159,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.netns)
         if any(map(item.get_closest_marker, ("slow", "ros1"))) and item.nodeid.startswith(RUN_AGAIN):
             reruns = 2 if item.get_closest_marker("browser") else 1  # drawn in software, next to other tests
-            item.add_marker(pytest.mark.flaky(reruns=reruns, reruns_delay=3))
+            item.add_marker(pytest.mark.flaky(reruns=reruns))
         ranks[_group(item)] = max(ranks.get(_group(item), 0), _rank(item))
     items.sort(key=lambda item: (-ranks[_group(item)], _group(item), _is_exhaustive(item)))
     if SLOW_DAY:
@@ -193,6 +207,8 @@ def _end_if_it_hangs(item: pytest.Item) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Begin each try of a test with all its time, and skip what needs ROS 1, or time, where there is none."""
+    if turns := item.config.stash.get(_TURNS, None):
+        turns.begin(alone=getattr(item, "execution_count", 1) > 1)
     _end_if_it_hangs(item)
     there = importlib.util.find_spec("rospy") and shutil.which("roscore")
     if item.get_closest_marker("ros1") and not there:
@@ -213,6 +229,8 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
             close_shared()
     finally:
         faulthandler.cancel_dump_traceback_later()
+        if turns := item.config.stash.get(_TURNS, None):
+            turns.end()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
