@@ -107,7 +107,7 @@ def test_nothing_is_said_of_engaging_with_a_simulated_robot_and_the_mode_is_swit
 def test_the_hand_drives_as_a_joystick_and_the_picture_shows_the_stick(handedness: str) -> None:
     with visiting(
         # Often, for a busy machine: a pause in the frames ends the hold until the hand is opened again.
-        "Stop:2 Go:1.5 Go@0,-0.06:3 Go@0.03,-0.06:1 Go@0.06,-0.06:7",
+        "Stop:2 Go:1 Go@0.03,-0.06:0.5 Go@0.06,-0.06:8",
         control={"mode": "joystick"},
         virtual_hand={"handedness": handedness},
         camera={"width": 640, "height": 480, "fps": 10},

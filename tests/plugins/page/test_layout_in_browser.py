@@ -212,7 +212,7 @@ def test_nothing_moves_or_is_cut_when_another_asks_to_drive(locale: str) -> None
             for each in (page, other):
                 each.set_viewport_size(size)
             ask.wait_for()
-            before = page.evaluate(PLACES)
+            before = page.evaluate(SETTLED)
             ask.click()
             page.locator(".request .question").wait_for()
             assert page.evaluate(PLACES) == before
@@ -228,6 +228,18 @@ def test_nothing_moves_or_is_cut_when_another_asks_to_drive(locale: str) -> None
 
 PLACES = """[...document.querySelectorAll(".top, .banner, .viewer, .legend, .panels")]
     .map((each) => Math.round(each.getBoundingClientRect().top))"""
+
+# Places that have not changed for 20 frames, after the window got another size.
+SETTLED = f"""async () => {{
+    let places = "";
+    for (let same = 0; same < 20; same++) {{
+        await new Promise(requestAnimationFrame);
+        const now = JSON.stringify({PLACES});
+        if (now !== places) same = 0;
+        places = now;
+    }}
+    return JSON.parse(places);
+}}"""
 
 
 def test_on_a_phone_the_whole_picture_is_in_view_while_one_teaches() -> None:

@@ -57,8 +57,8 @@ def test_a_run_in_real_time_gives_the_same_however_it_was_disturbed(tmp_path: Pa
         graph.wait(1.0)
     comparison, moments = replayed(tmp_path / "drive.mcap")
     assert moments == []
-    assert comparison.signs > 50
-    assert comparison.commands > 50
+    assert comparison.signs > 20
+    assert comparison.commands > 20
 
 
 @pytest.mark.slow
@@ -71,7 +71,7 @@ def test_a_recording_that_began_in_mid_run_can_be_replayed(tmp_path: Path) -> No
         graph.end_recording()
         graph.wait(1.0)
     comparison, moments = replayed(tmp_path / "drive.mcap")
-    assert comparison.signs > 50
+    assert comparison.signs > 20
     assert Counter(moment.what for moment in moments)["sign"] < comparison.signs / 4
 
 
