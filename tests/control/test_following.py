@@ -21,12 +21,19 @@ def test_a_robot_whose_odometry_stops_is_not_there() -> None:
     assert following.step(0.02, Velocity(0.5, 0.0)) is None
 
 
-def test_what_has_come_since_the_last_step_is_no_older() -> None:
+def test_the_first_odometry_is_no_older_for_a_late_step() -> None:
     following = Following()
     following.note(Velocity(0.5, 0.0), since_step_s=1.5)
     assert following.step(1.5, Velocity(0.5, 0.0)) is None
     assert following.step(0.35, Velocity(0.5, 0.0)) is None
     assert following.step(0.06, Velocity(0.5, 0.0)) == "the robot's odometry has stopped"
+
+
+def test_what_a_robot_did_before_a_later_late_step_is_not_known() -> None:
+    following = Following()
+    following.note(Velocity(0.5, 0.0))
+    following.note(Velocity(0.5, 0.0), since_step_s=0.5)
+    assert following.step(0.5, Velocity(0.5, 0.0)) == "the robot's odometry has stopped"
 
 
 @pytest.mark.parametrize("checks_motion", [True, False])

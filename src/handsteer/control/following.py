@@ -35,11 +35,13 @@ class Following:
 
         Args:
             measured: What the robot does now.
-            since_step_s: Time since the last :meth:`step`, in seconds, which the next one adds.
+            since_step_s: Time since the last :meth:`step`, in seconds, which the next one adds. It does not count for
+                the first odometry: a node takes long to start on a busy machine. It does for later odometry, as a node
+                that was stalled does not know what the robot did meanwhile.
         """
         if measured.is_finite:
+            self._age_s = 0.0 if self._measured is not None else -since_step_s
             self._measured = measured
-            self._age_s = -since_step_s
         elif self._measured is None:
             self._measured = ZERO
 
