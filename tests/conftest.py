@@ -158,7 +158,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if set(getattr(item, "fixturenames", ())) & _NETWORKS:
             item.add_marker(pytest.mark.netns)
         if any(map(item.get_closest_marker, ("slow", "ros1"))) and item.nodeid.startswith(RUN_AGAIN):
-            reruns = 2 if item.get_closest_marker("browser") else 1  # drawn in software, next to other tests
+            reruns = 2 if item.get_closest_marker("browser") else 1  # drawn in software
             item.add_marker(pytest.mark.flaky(reruns=reruns))
         ranks[_group(item)] = max(ranks.get(_group(item), 0), _rank(item))
     items.sort(key=lambda item: (-ranks[_group(item)], _group(item), _is_exhaustive(item)))

@@ -1,15 +1,11 @@
 """A test that is run again runs alone."""
 
-import sys
+import fcntl
 import threading
 import time
 from pathlib import Path
 
-import pytest
-
 from tests.turns import Turns
-
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="has no flock")
 
 
 class Runner:
@@ -44,8 +40,6 @@ def test_tests_run_next_to_each_other_but_for_one_that_is_alone(tmp_path: Path) 
 
 def is_open(folder: Path) -> bool:
     """Return whether a test may start now, besides what is running."""
-    import fcntl  # noqa: PLC0415 - not on Windows
-
     with (folder / "entry").open("w") as entry:
         try:
             fcntl.flock(entry, fcntl.LOCK_EX | fcntl.LOCK_NB)

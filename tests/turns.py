@@ -1,10 +1,7 @@
 """Lets one of the processes that run the tests run a test alone, which no other test can upset."""
 
-import sys
+import fcntl
 from pathlib import Path
-
-if sys.platform != "win32":
-    import fcntl
 
 
 class Turns:
@@ -22,8 +19,6 @@ class Turns:
 
     def begin(self, *, alone: bool) -> None:
         """Wait for the others: all of them, or one that is alone or waits for that."""
-        if sys.platform == "win32":
-            return
         fcntl.flock(self._entry, fcntl.LOCK_EX)
         fcntl.flock(self._running, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
         if not alone:
@@ -31,7 +26,5 @@ class Turns:
 
     def end(self) -> None:
         """Let the others go on."""
-        if sys.platform == "win32":
-            return
         for lock in (self._running, self._entry):
             fcntl.flock(lock, fcntl.LOCK_UN)

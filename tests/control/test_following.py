@@ -29,7 +29,7 @@ def test_the_first_odometry_is_no_older_for_a_late_step() -> None:
     assert following.step(0.06, Velocity(0.5, 0.0)) == "the robot's odometry has stopped"
 
 
-def test_what_a_robot_did_before_a_later_late_step_is_not_known() -> None:
+def test_later_odometry_does_not_hide_that_the_control_was_stalled() -> None:
     following = Following()
     following.note(Velocity(0.5, 0.0))
     following.note(Velocity(0.5, 0.0), since_step_s=0.5)

@@ -37,7 +37,7 @@ class Following:
             measured: What the robot does now.
             since_step_s: Time since the last :meth:`step`, in seconds, which the next one adds. It does not count for
                 the first odometry: a node takes long to start on a busy machine. It does for later odometry, as a node
-                that was stalled does not know what the robot did meanwhile.
+                that was stalled has missed what the robot did.
         """
         if measured.is_finite:
             self._age_s = 0.0 if self._measured is not None else -since_step_s
